@@ -1,0 +1,397 @@
+"""The aircraft: JSBSim, seen through SI units and the runway frame.
+
+The only file that imports jsbsim; feet, pounds and degrees end here.  An aircraft's folder holds ``<model>.xml`` with
+``Systems/`` and ``Engines/`` beside it.  The model must offer what :class:`Plant` reads and writes (``imu/*``,
+``nav/*``, ``ap/*``; its first three contacts are the nose, left and right main wheels); a property that it lacks is an
+error, because JSBSim itself would make one silently.
+
+JSBSim's ground is the ellipsoid, raised; the runway is a plane.  The terrain under the aircraft is therefore set to the
+runway's plane at every step, so that wheels touch where the runway frame's z says they do.
+"""
+
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import jsbsim
+import numpy as np
+
+from estimator.so3 import Array, Vec3, rotate, rotate_back
+from landsim.attitude import rotation_at
+from landsim.errors import InputError
+from landsim.runway import Runway
+from landsim.state import Command
+from landsim.truth import InitialState, Truth
+from landsim.units import DEG, FT, LBF
+
+RUN_UP_S = 1.0
+"""Time the engine runs, airframe held, before trim: JSBSim's search for a steady propeller diverges from standstill."""
+RUN_UP_THROTTLE = 0.3
+CONTACT_HEIGHT = 30.0
+"""m; above it no part of any aircraft can touch the ground, and the contacts are not asked."""
+
+_INTEGRATORS = (
+    "simulation/integrator/rate/rotational",
+    "simulation/integrator/rate/translational",
+    "simulation/integrator/position/rotational",
+    "simulation/integrator/position/translational",
+)
+_READ = (
+    "position/ecef-x-ft",
+    "position/ecef-y-ft",
+    "position/ecef-z-ft",
+    "position/geod-alt-ft",
+    "position/lat-geod-rad",
+    "position/long-gc-rad",
+    "velocities/ecef-x-fps",
+    "velocities/ecef-y-fps",
+    "velocities/ecef-z-fps",
+    "attitude/phi-rad",
+    "attitude/theta-rad",
+    "attitude/psi-rad",
+    "velocities/vt-fps",
+    "fcs/elevator-pos-rad",
+    "fcs/left-aileron-pos-rad",
+    "fcs/rudder-pos-rad",
+    "fcs/throttle-pos-norm",
+    "propulsion/engine/thrust-lbs",
+)
+_WHEELS = ("gear/unit[0]/WOW", "gear/unit[1]/WOW", "gear/unit[2]/WOW")
+_FEED = (
+    "imu/p-rad_sec",
+    "imu/q-rad_sec",
+    "imu/r-rad_sec",
+    "imu/ay-mps2",
+    "nav/roll-rad",
+    "nav/pitch-rad",
+    "nav/airspeed-mps",
+)
+_COMMAND = (
+    "ap/engaged",
+    "ap/pitch-cmd-rad",
+    "ap/roll-cmd-rad",
+    "ap/airspeed-cmd-mps",
+    "ap/idle",
+    "ap/ground",
+    "ap/steering-cmd-norm",
+    "ap/brake-cmd-norm",
+)
+_BALANCES = (  # what trim brings to zero, its tolerance in JSBSim's units, and what it moves to get there
+    ("wdot", "accelerations/wdot-ft_sec2", 1e-3, "lift (angle of attack)"),
+    ("udot", "accelerations/udot-ft_sec2", 1e-3, "speed (throttle)"),
+    ("qdot", "accelerations/qdot-rad_sec2", 1e-4, "pitch (elevator)"),
+    ("vdot", "accelerations/vdot-ft_sec2", 1e-3, "side force (bank)"),
+    ("pdot", "accelerations/pdot-rad_sec2", 1e-4, "roll (aileron)"),
+    ("rdot", "accelerations/rdot-rad_sec2", 1e-4, "yaw (rudder)"),
+)
+
+
+class PlantError(InputError):
+    """The model cannot be loaded, or lacks a property."""
+
+
+class TrimError(RuntimeError):
+    """The aircraft has no steady flight at the state asked for."""
+
+
+class TrimPoint(NamedTuple):
+    """Steady flight as JSBSim found it."""
+
+    alpha: float
+    """Angle of attack, rad."""
+    elevator: float
+    """rad, trailing edge down positive."""
+    thrust: float
+    """N."""
+    pitch: float
+    """Relative to the local horizon, rad."""
+    throttle: float
+    """0 to 1."""
+
+
+class _Listener(jsbsim.FGLogger):
+    """Keeps what JSBSim would print, warnings and worse; nothing reaches the terminal."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._level = jsbsim.LogLevel.BULK
+        self._words: list[str] = []
+
+    def set_level(self, level: jsbsim.LogLevel) -> None:
+        self._level = level
+
+    def message(self, text: str) -> None:
+        if self._level >= jsbsim.LogLevel.WARN:
+            self._words.append(text)
+
+    def file_location(self, filename: str, line: int) -> None:
+        self._words.append(f"{Path(filename).name} line {line}: ")
+
+    def format(self, style: jsbsim.LogFormat) -> None: ...
+
+    def flush(self) -> None: ...
+
+    @property
+    def heard(self) -> str:
+        return " ".join("".join(self._words).split())
+
+
+def _listen() -> _Listener:
+    """A fresh listener; JSBSim has one for the whole process."""
+    listener = _Listener()
+    jsbsim.set_logger(listener)
+    return listener
+
+
+def load(folder: Path, model: str) -> jsbsim.FGFDMExec:
+    """JSBSim with the model loaded, without a word on the terminal.
+
+    Raises
+    ------
+    PlantError
+        When there is no such file, or JSBSim finds fault with it.
+    """
+    folder = folder.resolve()
+    path = folder / f"{model}.xml"
+    if not path.is_file():
+        raise PlantError(f"{path}: no such aircraft model")
+    listener = _listen()
+    fdm = jsbsim.FGFDMExec(None)
+    fdm.set_debug_level(0)
+    try:
+        loaded = fdm.load_model_with_paths(model, str(folder), str(folder / "Engines"), str(folder / "Systems"), False)
+    except jsbsim.BaseError as error:
+        raise PlantError(f"{path}: JSBSim refuses it: {listener.heard or error}") from error
+    if listener.heard or not loaded:
+        raise PlantError(f"{path}: JSBSim refuses it: {listener.heard or 'no reason given'}")
+    return fdm
+
+
+def node(fdm: jsbsim.FGFDMExec, name: str) -> jsbsim.FGPropertyNode:
+    """A property's node.
+
+    Raises
+    ------
+    PlantError
+        When the loaded model has no such property.
+    """
+    found = fdm.get_property_manager().get_node(name, False)
+    if found is None:
+        raise PlantError(f"{fdm.get_model_name()}: JSBSim has no property {name!r} in this model")
+    return found
+
+
+class Plant:
+    """One flight of one aircraft.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds the model.
+    model : str
+        Name of the model's file, without ``.xml``.
+    runway : Runway
+        Whose frame is used, and whose plane is the ground.
+    rate_hz : float
+        Steps a second.
+
+    Raises
+    ------
+    PlantError
+        When the model does not load or lacks a property.
+    """
+
+    trim: TrimPoint
+
+    def __init__(self, folder: Path, model: str, runway: Runway, rate_hz: float) -> None:
+        self._runway = runway
+        self._attitude = rotation_at(runway.latitude, runway.longitude, runway.heading)
+        self._runway_from_ecef_ft = tuple(FT * r for r in runway.R_runway_from_ecef)
+        self._origin = rotate(runway.R_runway_from_ecef, runway.origin_in_ecef)
+        self._dt = 1.0 / rate_hz
+        self._steps = 0
+        self._started = False
+        self._path = folder / f"{model}.xml"
+        fdm = self._fdm = load(folder, model)
+        fdm.set_dt(self._dt)
+        self._run = fdm.run
+        self._read = tuple(node(fdm, name).get_double_value for name in _READ)
+        self._wheels = tuple(node(fdm, name).get_double_value for name in _WHEELS)
+        contacts = int(node(fdm, "gear/num-units").get_double_value())
+        manager = fdm.get_property_manager()
+        structure = (manager.get_node(f"contact/unit[{i}]/WOW", False) for i in range(contacts))
+        self._structure = tuple(contact.get_double_value for contact in structure if contact is not None)
+        self._feed = tuple(node(fdm, name).set_double_value for name in _FEED)
+        self._command = tuple(node(fdm, name).set_double_value for name in _COMMAND)
+        self._set_terrain = node(fdm, "position/terrain-elevation-asl-ft").set_double_value
+
+    def _set(self, name: str, value: float) -> None:
+        node(self._fdm, name).set_double_value(value)
+
+    def _get(self, name: str) -> float:
+        return float(node(self._fdm, name).get_double_value())
+
+    def start(self, initial: InitialState) -> Truth:
+        """Put the aircraft in the air, engine running, in trim.
+
+        Returns
+        -------
+        Truth
+            At t = 0.
+
+        Raises
+        ------
+        TrimError
+            When JSBSim finds no steady flight; the message names what does not balance.
+        PlantError
+            When the model reads a property that nothing provides.
+        """
+        if self._started:
+            raise RuntimeError("a Plant flies once: make a new one")
+        self._started = True
+        latitude, longitude, height = self._runway.to_geodetic(initial.position)
+        R_runway_from_ned = self._runway.R_runway_from_ned_at(latitude, longitude)
+        climb, heading = initial.flight_path, initial.heading
+        direction = (math.cos(climb) * math.cos(heading), math.cos(climb) * math.sin(heading), -math.sin(climb))
+        north, east, down = rotate_back(R_runway_from_ned, direction)
+        self._set("ic/lat-geod-deg", latitude / DEG)
+        self._set("ic/long-gc-deg", longitude / DEG)
+        self._set("ic/terrain-elevation-ft", (height + initial.position[2] / R_runway_from_ned[8]) / FT)
+        self._set("ic/h-sl-ft", height / FT)
+        self._set("ic/psi-true-deg", math.atan2(east, north) / DEG % 360.0)
+        self._set("ic/vt-fps", initial.speed / FT)
+        self._set("ic/gamma-deg", math.atan2(-down, math.hypot(north, east)) / DEG)
+        self._set("nav/airspeed-mps", initial.speed)
+        try:
+            self._fdm.run_ic()
+            # over raised terrain JSBSim misses the height it is given by millimetres
+            self._set("ic/h-sl-ft", 2.0 * height / FT - self._get("position/geod-alt-ft"))
+            self._fdm.run_ic()
+        except jsbsim.BaseError as error:
+            raise PlantError(f"{self._path}: JSBSim cannot run it: {error}") from error
+        self._run_up()
+        listener = _listen()
+        try:
+            self._fdm.do_trim(int(jsbsim.TrimMode.FULL))
+        except jsbsim.TrimFailureError as error:
+            raise TrimError(self._trim_message(initial, listener.heard)) from error
+        truth = self._truth()
+        self.trim = TrimPoint(
+            alpha=self._get("aero/alpha-rad"),
+            elevator=truth.elevator,
+            thrust=truth.thrust,
+            pitch=self._get("attitude/theta-rad"),
+            throttle=truth.throttle,
+        )
+        return truth
+
+    def _run_up(self) -> None:
+        """Run the engine at flying speed with the airframe held where it is."""
+        self._set("propulsion/set-running", -1.0)
+        self._set("fcs/throttle-cmd-norm", RUN_UP_THROTTLE)
+        held = [(name, self._get(name)) for name in _INTEGRATORS]
+        for name, _ in held:
+            self._set(name, 0.0)
+        for _ in range(round(RUN_UP_S / self._dt)):
+            self._run()
+        for name, value in held:
+            self._set(name, value)
+
+    def _trim_message(self, initial: InitialState, heard: str) -> str:
+        off = [what for _, name, tolerance, what in _BALANCES if not abs(self._get(name)) < tolerance]
+        named = [what for axis, _, _, what in _BALANCES if axis in heard]
+        return (
+            f"no steady flight at {initial.speed:.1f} m/s on a flight path of {initial.flight_path / DEG:.1f} deg: "
+            f"no balance of {', '.join(named or off)}"
+        )
+
+    def linearised(self) -> tuple[tuple[str, ...], Array]:
+        """The states and the state matrix of JSBSim's own linearisation about where the aircraft is now.
+
+        Returns
+        -------
+        (n,) tuple of str, (n, n) array
+            Angles and rates in rad and rad/s, speed and height in ft/s and ft.
+        """
+        linear = jsbsim.FGLinearization(self._fdm)
+        return tuple(linear.x_names), np.array(linear.system_matrix, dtype=float)
+
+    def command(self, command: Command) -> None:
+        """Hand guidance's command to the inner loops."""
+        engaged, pitch, roll, airspeed, idle, ground, steering, brake = self._command
+        engaged(command.engaged)
+        pitch(command.pitch)
+        roll(command.roll)
+        airspeed(command.airspeed)
+        idle(command.idle)
+        ground(command.ground)
+        steering(command.steering)
+        brake(command.brake)
+
+    def feed(self, rate: Vec3, side_force: float, roll: float, pitch: float, airspeed: float) -> None:
+        """Hand the inner loops their measurements.
+
+        Parameters
+        ----------
+        rate : Vec3
+            Body rates, rad/s.
+        side_force : float
+            Specific force along body y, m/s².
+        roll, pitch : float
+            rad.
+        airspeed : float
+            m/s.
+        """
+        set_p, set_q, set_r, set_ay, set_roll, set_pitch, set_airspeed = self._feed
+        set_p(rate[0])
+        set_q(rate[1])
+        set_r(rate[2])
+        set_ay(side_force)
+        set_roll(roll)
+        set_pitch(pitch)
+        set_airspeed(airspeed)
+
+    def step(self) -> Truth:
+        """One step of JSBSim.
+
+        Returns
+        -------
+        Truth
+            At its end.
+        """
+        self._run()
+        self._steps += 1
+        return self._truth()
+
+    def _truth(self) -> Truth:
+        (
+            x, y, z, altitude, latitude, longitude, vx, vy, vz, phi, theta, psi, airspeed,
+            elevator, aileron, rudder, throttle, thrust,
+        ) = [read() for read in self._read]  # fmt: skip
+        # products written out: a call costs more than what it would compute
+        r0, r1, r2, r3, r4, r5, r6, r7, r8 = self._runway_from_ecef_ft
+        x0, y0, z0 = self._origin
+        down = r6 * x + r7 * y + r8 * z - z0
+        cosine, R_runway_from_body = self._attitude(latitude, longitude, phi, theta, psi)
+        # here the ellipsoid's normal through the aircraft meets the runway's plane
+        self._set_terrain(altitude + down / (FT * cosine))
+        nose = left = right = touching = False
+        if down > -CONTACT_HEIGHT:
+            nose, left, right = [read() != 0.0 for read in self._wheels]
+            touching = any([read() != 0.0 for read in self._structure])  # noqa: C419 (a list is faster)
+        return Truth(
+            self._steps * self._dt,
+            (r0 * x + r1 * y + r2 * z - x0, r3 * x + r4 * y + r5 * z - y0, down),
+            (r0 * vx + r1 * vy + r2 * vz, r3 * vx + r4 * vy + r5 * vz, r6 * vx + r7 * vy + r8 * vz),
+            R_runway_from_body,
+            FT * airspeed,
+            nose,
+            left,
+            right,
+            touching,
+            elevator,
+            aileron,
+            rudder,
+            throttle,
+            LBF * thrust,
+        )
