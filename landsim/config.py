@@ -1,0 +1,233 @@
+"""Scenario and aircraft files: TOML to the frozen models of :mod:`landsim.schema`, with errors that name file and key.
+
+``load_scenario("landing", overrides={"runway.width_m": 45.0})`` is the way in; ``resolved_toml`` is the way back.
+"""
+
+import tomllib
+from collections.abc import Mapping
+from copy import deepcopy
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+
+from landsim.errors import ScenarioError, did_you_mean, what_is_wrong
+from landsim.resources import AIRCRAFT_FILE, find_aircraft, find_scenario
+from landsim.schema import (
+    AircraftChoice,
+    AircraftConfig,
+    AircraftFile,
+    ApproachConfig,
+    ApproachGains,
+    BoxConfig,
+    CameraConfig,
+    FlareGains,
+    GearConfig,
+    GuidanceConfig,
+    ImuConfig,
+    MountConfig,
+    NavigationConfig,
+    PitotConfig,
+    RolloutGains,
+    RunwayConfig,
+    Scenario,
+    ScenarioFile,
+    Section,
+    SimulationConfig,
+    SpeedsConfig,
+    StartConfig,
+    field_names,
+)
+
+__all__ = [
+    "AircraftChoice",
+    "AircraftConfig",
+    "AircraftFile",
+    "ApproachConfig",
+    "ApproachGains",
+    "BoxConfig",
+    "CameraConfig",
+    "FlareGains",
+    "GearConfig",
+    "GuidanceConfig",
+    "ImuConfig",
+    "MountConfig",
+    "NavigationConfig",
+    "PitotConfig",
+    "RolloutGains",
+    "RunwayConfig",
+    "Scenario",
+    "ScenarioError",
+    "ScenarioFile",
+    "SimulationConfig",
+    "SpeedsConfig",
+    "StartConfig",
+    "load_aircraft",
+    "load_scenario",
+    "parse_setting",
+    "resolved_toml",
+]
+
+_Model = TypeVar("_Model", bound=Section)
+
+
+def load_scenario(name_or_path: str | Path, overrides: Mapping[str, object] | None = None) -> Scenario:
+    """Read, override and validate a scenario.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        A scenario file, or the name of a shipped scenario; a file wins over a name.
+    overrides : mapping, optional
+        Dotted keys and values that replace the file's, such as ``{"runway.width_m": 45.0}``.  A relative path in
+        ``aircraft.name`` is then relative to the working directory; in a file it is relative to the file.
+
+    Returns
+    -------
+    Scenario
+        Frozen, with its aircraft in ``aircraft_config``.
+
+    Raises
+    ------
+    ScenarioError
+        One line: file, dotted key, what is wrong, and the nearest right name.
+    """
+    path = find_scenario(name_or_path)
+    overrides = dict(overrides or {})
+    table = _read(path)
+    for key, value in overrides.items():
+        _override(table, key, value, path)
+    settings = _validated(ScenarioFile, table, path, overrides)
+    base = Path() if "aircraft.name" in overrides or "aircraft" in overrides else path.parent
+    name, folder = _named(path, overrides, settings.aircraft.name, base)
+    sections = {key: getattr(settings, key) for key in ScenarioFile.model_fields}
+    return Scenario(
+        **{**sections, "aircraft": AircraftChoice(name=name)},
+        name=path.stem,
+        path=path,
+        aircraft_config=_aircraft_in(folder),
+    )
+
+
+def load_aircraft(name_or_path: str | Path) -> AircraftConfig:
+    """Read and validate an aircraft.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        A folder that holds aircraft.toml, or the name of a shipped aircraft; a folder wins over a name.
+
+    Raises
+    ------
+    ScenarioError
+        One line: file, dotted key, what is wrong, and the nearest right name.
+    """
+    return _aircraft_in(find_aircraft(name_or_path)[1])
+
+
+def resolved_toml(scenario: ScenarioFile) -> str:
+    """The scenario as TOML that says every key, defaults and overrides included; it loads to an equal scenario."""
+    import tomli_w
+
+    # TOML has no null: a key that is None is left out, which is what None stands for.
+    settings = {key: getattr(scenario, key) for key in ScenarioFile.model_fields}
+    tables = {
+        key: value.model_dump(exclude_none=True) if isinstance(value, Section) else value
+        for key, value in settings.items()
+    }
+    return tomli_w.dumps(tables)
+
+
+def parse_setting(text: str) -> tuple[str, object]:
+    """Key and value of ``dotted.key=value``, where the value is TOML, or a bare word, which stands for a string.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no ``=``, no key or no value.
+    """
+    key, equals, value = (part.strip() for part in text.partition("="))
+    if not (equals and key and value):
+        raise ScenarioError(f'setting "{text}": must be dotted.key=value')
+    try:
+        table = tomllib.loads(f"value = {value}")
+    except tomllib.TOMLDecodeError:
+        table = {}
+    if list(table) == ["value"]:
+        return key, table["value"]
+    if value[0] in "[{\"'":
+        raise ScenarioError(f'setting "{text}": the value is not TOML')
+    return key, value
+
+
+def _aircraft_in(folder: Path) -> AircraftConfig:
+    path = folder / AIRCRAFT_FILE
+    settings = _validated(AircraftFile, _read(path), path)
+    model = folder / f"{settings.model}.xml"
+    if not model.is_file():
+        raise ScenarioError(f"{path}: model: {model} does not exist")
+    return AircraftConfig(**{key: getattr(settings, key) for key in AircraftFile.model_fields}, folder=folder)
+
+
+def _named(path: Path, overrides: Mapping[str, object], name: str, base: Path) -> tuple[str, Path]:
+    try:
+        return find_aircraft(name, base)
+    except ScenarioError as error:
+        raise ScenarioError(f"{_where('aircraft.name', path, overrides)}: {error}") from None
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file."""
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(f"{path}: not valid TOML: {error}") from None
+    except UnicodeDecodeError as error:
+        line = error.object[: error.start].count(b"\n") + 1
+        raise ScenarioError(f"{path}: not valid TOML: line {line} is not UTF-8 text") from None
+    except RecursionError:
+        raise ScenarioError(f"{path}: not valid TOML: nested too deeply") from None
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def _override(table: dict[str, Any], key: str, value: object, path: Path) -> None:
+    """Set one dotted key of the tables."""
+    *tables, last = key.split(".")
+    for done, name in enumerate(tables, 1):
+        table = table.setdefault(name, {})
+        if not isinstance(table, dict):
+            raise ScenarioError(f"{path}: override {key}: {'.'.join(tables[:done])} is not a table")
+    table[last] = deepcopy(value)  # later overrides may write into it
+
+
+def _validated(
+    model: type[_Model], table: Mapping[str, Any], path: Path, overrides: Mapping[str, object] | None = None
+) -> _Model:
+    """The model of a file's tables; of several things wrong, the first is told."""
+    try:
+        return model.model_validate(table)
+    except ValidationError as failure:
+        errors = failure.errors(include_url=False)
+    # A misspelt key is told before what it is missed as.
+    error = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
+    place = tuple(name for name in error["loc"] if not (isinstance(name, str) and name.startswith("function-")))
+    if key := error.get("ctx", {}).get("key"):
+        place += tuple(key.split("."))
+    dotted = ".".join(str(name) for name in place)
+    if error["type"] == "extra_forbidden":
+        prefix = "".join(f"{name}." for name in place[:-1])
+        what = f"unknown key{did_you_mean(str(place[-1]), field_names(model, place[:-1]), prefix)}"
+    elif error["type"] == "missing" and isinstance(place[-1], int):
+        dotted = ".".join(str(name) for name in place[:-1])
+        what = f"element {place[-1] + 1} is missing"
+    else:
+        what = what_is_wrong(dict(error))
+    others = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+    raise ScenarioError(f"{_where(dotted, path, overrides or {})}: {what}{others}")
+
+
+def _where(dotted: str, path: Path, overrides: Mapping[str, object]) -> str:
+    """File and key; says so when it is not the file that holds the value."""
+    overridden = any(f"{dotted}.".startswith(f"{key}.") or f"{key}.".startswith(f"{dotted}.") for key in overrides)
+    return f"{path}: {'override ' if overridden else ''}{dotted}"

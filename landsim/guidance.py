@@ -1,0 +1,240 @@
+"""Guidance: glide slope and localizer, flare, touchdown and rollout.  Pure: (navigation state, phase) to command.
+
+The phases follow one another and never go back: acquire, approach, flare, rollout, stopped.  Everything that is carried
+from one call to the next is in `GuidanceState`.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from estimator.so3 import Vec3, rotate
+from landsim.config import AircraftConfig, ApproachConfig
+from landsim.state import Command, NavState, Phase
+from landsim.units import DEG
+
+
+@dataclass(frozen=True, slots=True)
+class Law:
+    """The control law of one aircraft on one approach, in SI; the gains are those of ``aircraft.toml``."""
+
+    dt: float
+    """Between calls, s."""
+    gravity: float
+    slope: float
+    """Tangent of the glide slope."""
+    aim_point: float
+    approach_speed: float
+    trim_alpha: float
+    trim_alpha_slope: float
+    height_gain: float
+    pitch_gain: float
+    pitch_integral: float
+    max_sink: float
+    lateral_gain: float
+    lateral_speed_max: float
+    bank_gain: float
+    bank_max: float
+    flare_height: float
+    flare_time: float
+    flare_bias: float
+    touchdown_height: float
+    lower_rate: float
+    rollout_pitch: float
+    brake_delay: float
+    brake: float
+    heading_gain: float
+    heading_max: float
+    steering_gain: float
+    yaw_rate_gain: float
+    stop_speed: float
+    wheels: Vec3
+    """Midpoint of the main wheels, body frame, m."""
+    camera: Vec3
+    """Projection centre, body frame, m."""
+    tilt_early: float
+    tilt_late: float
+    half_view: float
+    """From the optical axis to the image's lower edge, rad."""
+
+
+def law_of(aircraft: AircraftConfig, approach: ApproachConfig, gravity: float, half_view: float, dt: float) -> Law:
+    """The law of an aircraft's gains on an approach."""
+    a, f, r = aircraft.guidance.approach, aircraft.guidance.flare, aircraft.guidance.rollout
+    left, right = aircraft.gear.left_wheel_body_m, aircraft.gear.right_wheel_body_m
+    return Law(
+        dt=dt,
+        gravity=gravity,
+        slope=math.tan(approach.glide_slope_deg * DEG),
+        aim_point=approach.aim_point_m,
+        approach_speed=aircraft.speeds.approach_mps,
+        trim_alpha=a.trim_alpha_deg * DEG,
+        trim_alpha_slope=a.trim_alpha_slope_deg_per_mps * DEG,
+        height_gain=a.height_gain_per_s,
+        pitch_gain=a.pitch_gain_rad_per_mps,
+        pitch_integral=a.pitch_integral_rad_per_m,
+        max_sink=a.max_sink_mps,
+        lateral_gain=a.lateral_gain_per_s,
+        lateral_speed_max=a.lateral_speed_max_mps,
+        bank_gain=a.bank_gain_per_s,
+        bank_max=a.bank_max_deg * DEG,
+        flare_height=f.height_m,
+        flare_time=f.time_constant_s,
+        flare_bias=f.height_bias_m,
+        touchdown_height=f.touchdown_height_m,
+        lower_rate=r.pitch_rate_deg_s * DEG,
+        rollout_pitch=r.pitch_deg * DEG,
+        brake_delay=r.brake_delay_s,
+        brake=r.brake,
+        heading_gain=r.heading_per_m,
+        heading_max=r.heading_max_deg * DEG,
+        steering_gain=r.steering_gain,
+        yaw_rate_gain=r.yaw_rate_gain_s,
+        stop_speed=r.stop_speed_mps,
+        wheels=(0.5 * (left[0] + right[0]), 0.5 * (left[1] + right[1]), 0.5 * (left[2] + right[2])),
+        camera=aircraft.mount.position_body_m,
+        tilt_early=aircraft.mount.tilt_early_deg * DEG,
+        tilt_late=aircraft.mount.tilt_late_deg * DEG,
+        half_view=half_view,
+    )
+
+
+class GuidanceState(NamedTuple):
+    """What guidance remembers from one call to the next."""
+
+    phase: Phase
+    sink_integral: float
+    """Of the sink rate's error, m."""
+    pitch: float
+    """Last pitch command, rad."""
+    rollout_time: float
+    """Since touchdown, s."""
+    tilted: bool
+    """The mount has been told to tilt: it is told once."""
+
+
+INITIAL = GuidanceState(Phase.ACQUIRE, 0.0, 0.0, 0.0, False)
+
+
+def wheel_height(law: Law, nav: NavState) -> float:
+    """Height of the midpoint of the main wheels, unloaded, above the runway, m."""
+    return -nav.position[2] - rotate(nav.R_runway_from_body, law.wheels)[2]
+
+
+def next_phase(law: Law, nav: NavState, phase: Phase) -> Phase:
+    """The phase that a navigation state calls for."""
+    if not nav.ready:
+        return phase
+    if phase is Phase.ACQUIRE:
+        return Phase.APPROACH
+    if phase is Phase.APPROACH and wheel_height(law, nav) < law.flare_height:
+        return Phase.FLARE
+    if phase is Phase.FLARE and wheel_height(law, nav) < law.touchdown_height:
+        return Phase.ROLLOUT
+    if phase is Phase.ROLLOUT and math.hypot(nav.velocity[0], nav.velocity[1]) < law.stop_speed:
+        return Phase.STOPPED
+    return phase
+
+
+def guide(law: Law, nav: NavState, state: GuidanceState) -> tuple[Command, GuidanceState]:
+    """One call of guidance.
+
+    Parameters
+    ----------
+    law : Law
+    nav : NavState
+        All that is known of the aircraft.
+    state : GuidanceState
+        From the last call, or `INITIAL`.
+
+    Returns
+    -------
+    Command, GuidanceState
+    """
+    phase = next_phase(law, nav, state.phase)
+    if phase is Phase.ACQUIRE:
+        return _HANDS_OFF._replace(airspeed=law.approach_speed, tilt=law.tilt_early), state
+    if phase is Phase.ROLLOUT or phase is Phase.STOPPED:
+        return _rollout(law, nav, state._replace(phase=phase))
+    tilted = state.tilted or threshold_leaves(law, nav)
+    return _descend(law, nav, state._replace(phase=phase, tilted=tilted))
+
+
+_HANDS_OFF = Command(
+    engaged=False, pitch=0.0, roll=0.0, airspeed=0.0, idle=False, ground=False, steering=0.0, brake=0.0, tilt=0.0
+)
+
+
+def threshold_leaves(law: Law, nav: NavState) -> bool:
+    """Whether the threshold passes the image's lower edge, by the navigation state and the early tilt."""
+    x, _, z = rotate(nav.R_runway_from_body, law.camera)
+    below_horizon = math.atan2(-nav.position[2] - z, -nav.position[0] - x)
+    return below_horizon > law.half_view + law.tilt_early - nav.pitch
+
+
+def _descend(law: Law, nav: NavState, state: GuidanceState) -> tuple[Command, GuidanceState]:
+    flare = state.phase is Phase.FLARE
+    speed, sink = nav.velocity[0], nav.velocity[2]
+    if flare:
+        wanted = (max(wheel_height(law, nav), 0.0) + law.flare_bias) / law.flare_time
+    else:
+        above = -nav.position[2] - (law.aim_point - nav.position[0]) * law.slope
+        wanted = speed * law.slope + law.height_gain * above
+    wanted = max(-law.max_sink, min(law.max_sink, wanted))
+    error = sink - wanted
+    integral = state.sink_integral + error * law.dt
+    airspeed = max(nav.airspeed, 0.5 * law.approach_speed)
+    alpha = law.trim_alpha + law.trim_alpha_slope * (airspeed - law.approach_speed)
+    pitch = alpha - wanted / airspeed + law.pitch_gain * error + law.pitch_integral * integral
+    command = Command(
+        engaged=True,
+        pitch=pitch,
+        roll=bank_command(law, nav.position[1], nav.velocity[1]),
+        airspeed=law.approach_speed,
+        idle=flare,
+        ground=False,
+        steering=0.0,
+        brake=0.0,
+        tilt=law.tilt_late if state.tilted else law.tilt_early,
+    )
+    return command, state._replace(sink_integral=integral, pitch=pitch)
+
+
+def bank_command(law: Law, cross: float, cross_speed: float) -> float:
+    """Bank angle (rad) that brings the aircraft to the centreline.
+
+    Parameters
+    ----------
+    cross : float
+        Right of the centreline, m: a positive one commands a bank to the left, which is negative.
+    cross_speed : float
+        m/s, to the right.
+    """
+    wanted = max(-law.lateral_speed_max, min(law.lateral_speed_max, -law.lateral_gain * cross))
+    bank = math.atan(law.bank_gain * (wanted - cross_speed) / law.gravity)
+    return max(-law.bank_max, min(law.bank_max, bank))
+
+
+def steering_command(law: Law, cross: float, yaw: float, yaw_rate: float) -> float:
+    """Nose wheel and rudder, -1 to 1, right positive, that hold the centreline on the ground."""
+    heading = max(-law.heading_max, min(law.heading_max, -law.heading_gain * cross))
+    steering = law.steering_gain * (heading - yaw) - law.yaw_rate_gain * yaw_rate
+    return max(-1.0, min(1.0, steering))
+
+
+def _rollout(law: Law, nav: NavState, state: GuidanceState) -> tuple[Command, GuidanceState]:
+    time = state.rollout_time + law.dt
+    start = state.pitch if state.rollout_time > 0.0 else nav.pitch
+    pitch = max(law.rollout_pitch, start - law.lower_rate * law.dt)
+    command = Command(
+        engaged=True,
+        pitch=pitch,
+        roll=0.0,
+        airspeed=law.approach_speed,
+        idle=True,
+        ground=True,
+        steering=steering_command(law, nav.position[1], nav.yaw, nav.rate[2]),
+        brake=law.brake if time > law.brake_delay else 0.0,
+        tilt=law.tilt_early,
+    )
+    return command, state._replace(pitch=pitch, rollout_time=time)

@@ -1,0 +1,216 @@
+"""Drives the estimator: from the inertial unit, the camera's lines and the pitot tube to the navigation state.
+
+Raw vision poses come from the paper's solvers.  The filter starts from the first of them, and from then on takes three
+lines whenever the threshold is in view and two when it is not.
+"""
+
+import math
+from typing import NamedTuple
+
+from estimator.camera import PinholeCamera
+from estimator.fusion import (
+    NO_UPDATE,
+    Alignment,
+    Gates,
+    InertialVisionFilter,
+    Update,
+    body_from_camera,
+)
+from estimator.innovation import LineObservation, Lines, Mount, camera_axes, pose_innovation
+from estimator.lines import fit_variances
+from estimator.so3 import IDENTITY, Vec3, rotate_back, to_euler
+from estimator.strapdown import ImuNoise, Inertial, Site
+from estimator.three_line import three_line_pose
+from landsim.config import MountConfig, NavigationConfig
+from landsim.state import CameraFrame, ImuSample, LineReading, NavState, Stage
+from landsim.units import DEG
+
+NAN = math.nan
+AIRSPEED_SMOOTHING = 0.2
+"""Time constant of the low-pass on the pitot tube's noise, s."""
+
+
+def mount_of(config: MountConfig) -> Mount:
+    """The camera's mount, as the filter takes it."""
+    return Mount(config.position_body_m, (config.tilt_reading_sigma_deg * DEG) ** 2)
+
+
+class FrameResult(NamedTuple):
+    """What one camera frame gave."""
+
+    update: Update
+    stage: Stage
+    roll: float
+    """Of the camera triad, as predicted: what the late stage borrows, rad; NaN before the filter has started."""
+
+
+class Navigator:
+    """The navigation computer.
+
+    Parameters
+    ----------
+    camera : PinholeCamera
+    noise_px : float
+        1 σ of a line's points, in u and in v, px.
+    width : float
+        Of the runway, m.
+    site : Site
+    imu : ImuNoise
+    imu_dt : float
+        Interval of the inertial unit, s.
+    mount : Mount
+        Of the camera.
+    config : NavigationConfig
+    alpha : float
+        Angle of attack in trim, rad.
+
+    Attributes
+    ----------
+    filter : InertialVisionFilter or None
+        Once it has started.
+    airspeed : float
+        From the pitot tube, smoothed, m/s.
+    stage : Stage
+        What the last frame gave.
+    """
+
+    def __init__(
+        self,
+        camera: PinholeCamera,
+        noise_px: float,
+        width: float,
+        site: Site,
+        imu: ImuNoise,
+        imu_dt: float,
+        mount: Mount,
+        config: NavigationConfig,
+        alpha: float,
+    ) -> None:
+        self._camera = camera
+        self._noise_px = noise_px
+        self._width = width
+        self._site = site
+        self._imu = imu
+        self._dt = imu_dt
+        self._mount = mount
+        self._gates = Gates(config.gate_early, config.gate_late)
+        self._max_sigma = config.max_position_sigma_m
+        self._alignment = Alignment(site, config.start_frames, alpha, config.start_speed_sigma_mps)
+        self._smoothing = 1.0 - math.exp(-imu_dt / AIRSPEED_SMOOTHING)
+        self.airspeed = NAN
+        self._angle: Vec3 = (0.0, 0.0, 0.0)
+        self.stage = Stage.NONE
+        self.filter: InertialVisionFilter | None = None
+
+    def take_airspeed(self, airspeed: float) -> None:
+        """Take in a sample of the pitot tube (m/s), at the rate of the inertial unit."""
+        if math.isnan(self.airspeed):
+            self.airspeed = airspeed
+        self.airspeed += self._smoothing * (airspeed - self.airspeed)
+
+    def propagate(self, sample: ImuSample) -> None:
+        """Take in a sample of the inertial unit."""
+        self._angle = sample.angle
+        if self.filter is None:
+            self._alignment.propagate(sample.angle, sample.velocity, self._dt)
+        else:
+            self.filter.propagate(sample.angle, sample.velocity, self._dt)
+
+    def observe(self, frame: CameraFrame) -> FrameResult:
+        """Take in a camera frame."""
+        lines = Lines(self._observation(frame.left), self._observation(frame.threshold), self._observation(frame.right))
+        if self.filter is None:
+            return self._align(lines, frame.tilt)
+        self.filter.predict()
+        right, down, _ = camera_axes(self.filter.state.attitude, frame.tilt)
+        roll = math.atan2(right[2], down[2])
+        update = self.filter.observe(lines, frame.tilt)
+        self.stage = Stage.NONE if not update.accepted else Stage.EARLY if update.degrees == 6 else Stage.LATE
+        return FrameResult(update, self.stage, roll)
+
+    def _observation(self, reading: LineReading | None) -> LineObservation | None:
+        if reading is None:
+            return None
+        offset, angle = fit_variances(reading.spread, reading.points, self._noise_px)
+        return LineObservation(
+            reading.a, reading.b, reading.c, reading.centroid_u, reading.centroid_v, float(offset), float(angle)
+        )
+
+    def _align(self, lines: Lines, tilt: float) -> FrameResult:
+        """One of the first frames: the filter starts when there are enough."""
+        self.stage = Stage.NONE
+        left, threshold, right = lines
+        if left is None or threshold is None or right is None:
+            return FrameResult(NO_UPDATE, Stage.NONE, NAN)
+        solution = three_line_pose(
+            self._camera,
+            (left.a, left.b, left.c),
+            (threshold.a, threshold.b, threshold.c),
+            (right.a, right.b, right.c),
+            runway_width=self._width,
+        )
+        if not solution.valid:
+            return FrameResult(NO_UPDATE, Stage.NONE, NAN)
+        x, y, z = solution.position.tolist()
+        body = body_from_camera((x, y, z), solution.R_cam_from_runway, tilt, self._mount.lever)
+        if self._alignment.add(body, self.airspeed):
+            state = self._alignment.mean(self.airspeed)
+            pose = pose_innovation(self._camera, self._width, self._mount, lines, state.position, state.attitude, tilt)
+            if pose is not None:
+                start = self._alignment.start(self.airspeed, pose, self._mount, self._imu)
+                self.filter = InertialVisionFilter(
+                    self._camera, self._width, self._mount, self._site, self._imu, self._gates, start
+                )
+        self.stage = Stage.EARLY
+        return FrameResult(NO_UPDATE, Stage.EARLY, NAN)
+
+    @property
+    def diverged(self) -> bool:
+        """The filter's covariance is not finite, or its position sigma has passed the limit."""
+        if self.filter is None:
+            return False
+        p = self.filter.covariance
+        variance = float(p[0, 0]) + float(p[1, 1]) + float(p[2, 2])
+        return not variance <= self._max_sigma**2
+
+    @property
+    def inertial(self) -> Inertial:
+        """Position, velocity and attitude of the body; not to be used before the filter has started."""
+        return _UNKNOWN if self.filter is None else self.filter.state
+
+    def roll_and_pitch(self) -> tuple[float, float]:
+        """Of the body, rad: what the inner loops need between two calls of guidance."""
+        if self.filter is None:
+            return 0.0, 0.0
+        a = self.filter.state.attitude
+        return math.atan2(a[7], a[8]), math.atan2(-a[6], math.hypot(a[0], a[3]))
+
+    def state(self, time: float) -> NavState:
+        """What guidance is given."""
+        position, velocity, attitude = self.inertial
+        roll, pitch, yaw = to_euler(attitude)
+        return NavState(
+            time,
+            self.filter is not None,
+            position,
+            velocity,
+            attitude,
+            roll,
+            pitch,
+            yaw,
+            self._body_rate(),
+            self.airspeed,
+            self.stage,
+        )
+
+    def _body_rate(self) -> Vec3:
+        """Relative to the ground, less the estimated bias, rad/s."""
+        bias = _ZERO if self.filter is None else self.filter.gyro_bias
+        earth = _ZERO if self.filter is None else rotate_back(self.filter.state.attitude, self._site.earth_rate)
+        x, y, z = self._angle
+        dt = self._dt
+        return x / dt - bias[0] - earth[0], y / dt - bias[1] - earth[1], z / dt - bias[2] - earth[2]
+
+
+_ZERO: Vec3 = (0.0, 0.0, 0.0)
+_UNKNOWN = Inertial(_ZERO, _ZERO, IDENTITY)

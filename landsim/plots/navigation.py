@@ -1,0 +1,160 @@
+"""How well navigation knew where it was: its errors, and whether its own σ describe them."""
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
+from scipy.special import chdtri
+
+from landsim.log import QUANTITIES
+from landsim.metrics import Array, Log, error
+from landsim.plots.style import (
+    BLACK,
+    BLUE,
+    LIMIT,
+    SKY,
+    STYLE,
+    VERMILION,
+    VISION,
+    distance_axis,
+    event_times,
+    largest,
+    legend_in_head,
+    mark,
+    new_figure,
+    note,
+    span,
+    thinned,
+)
+
+if TYPE_CHECKING:
+    from landsim.config import Scenario
+
+
+@rc_context(STYLE)
+def navigation_errors(log: Log, metrics: dict[str, Any]) -> Figure:
+    """Errors of vision and of the filter in all six quantities, with the filter's ± 3 σ, over time.
+
+    Vision errs many times more than the filter, and both shrink by as much on the way: the scale is that of square
+    roots, so that all of it can be read.
+    """
+    figure = new_figure((10.0, 9.2), "navigation errors of the camera's pose, on axes of square roots", metrics)
+    grid = figure.add_gridspec(3, 2, left=0.085, right=0.985, top=0.85, bottom=0.06, hspace=0.3, wspace=0.24)
+    few = thinned(log)
+    marks = event_times(log, metrics)
+    for i, quantity in enumerate(QUANTITIES):
+        axes = figure.add_subplot(grid[i % 3, i // 3])
+        name, unit = quantity.rsplit("_", 1)
+        sigma = few[f"sigma_{quantity}"]
+        axes.plot(log["time_s"], error(log, "vision", quantity), **VISION)
+        axes.fill_between(
+            few["time_s"], -3.0 * sigma, 3.0 * sigma, color=SKY, alpha=0.35, lw=0.0, label="± 3 σ of the filter"
+        )
+        fused = error(few, "fused", quantity)
+        axes.plot(few["time_s"], fused, color=BLUE, lw=1.2, label="fused")
+        _root_scale(axes, error(log, "vision", quantity), fused, 3.0 * sigma)
+        axes.set_ylabel(f"{name} error, {'°' if unit == 'deg' else unit}")
+        axes.set_xlim(*span(log["time_s"], (0.0, 1.0)))
+        mark(axes, marks)
+        if i % 3 == 0:
+            distance_axis(axes, log)
+        if i % 3 == 2:
+            axes.set_xlabel("time, s")
+        axes.yaxis.set_label_coords(-0.125, 0.5)
+        if i == 0:
+            legend_in_head(figure, *axes.get_legend_handles_labels())
+    return figure
+
+
+def _root_scale(axes: Axes, *values: Array) -> None:
+    """A symmetric y axis of signed square roots, with a few round numbers on it; it holds 99.5 % of each array.
+
+    Without a number to show it says so.
+    """
+    finite = [np.abs(v[np.isfinite(v)]) for v in values]
+    top = 1.15 * max((float(np.quantile(v, 0.995)) for v in finite if v.size), default=0.0)
+    if top <= 0.0:
+        note(axes, "no estimate")
+        axes.set_yticks([])
+        return
+    axes.set_yscale("function", functions=(signed_root, signed_square))
+    ticks = [round_below(top)]
+    for _ in range(2):
+        ticks.append(round_below(ticks[-1] / 3.9))
+    axes.yaxis.set_major_locator(FixedLocator([-tick for tick in ticks] + [0.0] + ticks))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}".replace("-", "−")))
+    axes.set_ylim(-top, top)
+
+
+def signed_root(values: Array) -> Array:
+    """The square root of the magnitude, with the sign."""
+    return np.asarray(np.sign(values) * np.sqrt(np.abs(values)))
+
+
+def signed_square(values: Array) -> Array:
+    """The square, with the sign: the inverse of ``signed_root``."""
+    return np.asarray(np.sign(values) * np.square(values))
+
+
+def round_below(value: float) -> float:
+    """The next lower 1, 2 or 5 times a power of ten."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return power * max(m for m in (1.0, 2.0, 5.0) if m * power <= value * (1.0 + 1e-9))
+
+
+@rc_context(STYLE)
+def consistency(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -> Figure:
+    """Normalised errors and innovations squared against the bounds that hold 95 % of a consistent filter's frames.
+
+    The nine states are position, velocity and attitude; the fifteen have both biases besides.
+    """
+    figure = new_figure(
+        (10.0, 8.0), "consistency of the filter: normalised errors (NEES) and innovations (NIS), squared", metrics
+    )
+    grid = figure.add_gridspec(3, 1, left=0.075, right=0.985, top=0.83, bottom=0.065, hspace=0.2)
+    time = log["time_s"]
+    ones = np.ones(time.size)
+    gates = np.select(
+        [log["nis_dof"] == 6.0, log["nis_dof"] == 4.0],
+        [scenario.navigation.gate_early * ones, scenario.navigation.gate_late * ones],
+        math.nan,
+    )
+    panels = (
+        ("nees9", "NEES, 9 states (1)", 9.0 * ones, None),
+        ("nees15", "NEES, 15 states (1)", 15.0 * ones, None),
+        ("nis", "NIS (1)", log["nis_dof"], gates),
+    )
+    marks = event_times(log, metrics)
+    for i, (name, label, dof, gate) in enumerate(panels):
+        axes = figure.add_subplot(grid[i])
+        rows = np.flatnonzero(np.isfinite(log[name]) & np.isfinite(dof) & (log[name] > 0.0))
+        t, values, n = time[rows], log[name][rows], dof[rows]
+        axes.plot(t, values, **VISION | {"label": "each frame"})
+        if rows.size >= 30:
+            mean = np.convolve(values, np.ones(30) / 30.0, "valid")
+            axes.plot(t[15 : 15 + mean.size], mean, color=BLUE, lw=1.4, label="mean of 30 frames")
+        axes.plot(t, n, color=BLACK, lw=1.0, label="expected")
+        axes.plot(t, chdtri(n, 0.025), **LIMIT, label="95 % of the frames")
+        axes.plot(t, chdtri(n, 0.975), **LIMIT)
+        if gate is not None:
+            axes.plot(t, gate[rows], color=VERMILION, lw=1.0, ls=(0, (6, 2)), label="gate")
+        axes.set_yscale("log")
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+        axes.yaxis.set_minor_locator(NullLocator())
+        axes.set_ylabel(label)
+        axes.set_xlim(*span(time, (0.0, 1.0)))
+        mark(axes, marks)
+        if i == 0:
+            distance_axis(axes, log)
+        if rows.size:
+            axes.set_ylim(
+                0.4 * chdtri(float(n.min()), 0.975), 1.6 * max(largest(values), chdtri(float(n.max()), 0.025))
+            )
+    axes.set_xlabel("time, s")
+    legend_in_head(figure, *axes.get_legend_handles_labels())
+    return figure

@@ -1,0 +1,354 @@
+"""What a scenario file and an aircraft file may hold: frozen models, with the default and the range of every key.
+
+The models are the reference of the keys: a section of the file is a model, a key is a field, and the text under a field
+says what it means.  Keys carry their unit.  Unknown keys, values of another type (whole numbers stand for floats,
+nothing else is converted), NaN and infinities are refused.
+"""
+
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from landsim.errors import OWN_CHECK
+
+
+def _tuple_from_list(value: Any) -> Any:
+    """TOML has arrays; a frozen model holds tuples."""
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _refused(message: str, key: str | None = None) -> PydanticCustomError:
+    """What a check over several keys raises: a complete message and the dotted key to name, seen from the model."""
+    return PydanticCustomError(OWN_CHECK, "{message}", {"message": message, "key": key or ""})
+
+
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
+HeadingDeg = Annotated[float, Field(ge=-360.0, le=360.0)]
+PointM = Annotated[tuple[float, float, float], BeforeValidator(_tuple_from_list)]
+WindowS = Annotated[tuple[NotNegative, NotNegative], BeforeValidator(_tuple_from_list)]
+
+
+class Section(BaseModel):
+    """A table of a file."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class AircraftChoice(Section):
+    """``[aircraft]``: which aircraft flies."""
+
+    name: Annotated[str, Field(min_length=1)]
+    """Name of a shipped aircraft, or path of a folder that holds aircraft.toml, relative to the scenario file."""
+
+
+class RunwayConfig(Section):
+    """``[runway]``: a flat, straight runway on the WGS 84 ellipsoid."""
+
+    width_m: Positive = 30.0
+    """Between the painted edges."""
+    length_m: Positive = 2000.0
+    heading_deg: HeadingDeg = 0.0
+    """True heading of the landing direction."""
+    latitude_deg: Annotated[float, Field(ge=-89.0, le=89.0)] = 0.0
+    """Geodetic, of the middle of the threshold.  North is not a direction to fly by nearer to a pole."""
+    longitude_deg: Annotated[float, Field(ge=-180.0, le=180.0)] = 0.0
+    elevation_m: Annotated[float, Field(ge=-500.0, le=6000.0)] = 0.0
+    """Of the threshold above the ellipsoid."""
+
+
+class ApproachConfig(Section):
+    """``[approach]``: the line to fly."""
+
+    glide_slope_deg: Annotated[float, Field(gt=0.0, lt=15.0)] = 3.0
+    aim_point_m: NotNegative = 145.0
+    """Where the glide slope meets the runway, past the threshold."""
+
+
+class StartConfig(Section):
+    """``[start]``: the centre of gravity at the start, and the σ of what each seed adds, unknown to navigation."""
+
+    along_m: Annotated[float, Field(lt=0.0)] = -1000.0
+    """From the threshold, negative before it."""
+    cross_m: float = 0.0
+    """Right of the centreline."""
+    height_m: Positive = 60.0
+    """Above the threshold."""
+    heading_deg: Annotated[float, Field(ge=-90.0, le=90.0)] = 0.0
+    """Relative to the runway's, nose right positive."""
+    flight_path_deg: Annotated[float, Field(ge=-15.0, le=15.0)] = -3.0
+    speed_mps: Positive | None = None
+    """Airspeed; without it, the aircraft's approach speed."""
+    cross_sigma_m: NotNegative = 8.0
+    height_sigma_m: NotNegative = 4.0
+    heading_sigma_deg: NotNegative = 2.0
+    speed_sigma_mps: NotNegative = 1.0
+
+
+class CameraConfig(Section):
+    """``[camera]``: lens, image and the noise of the lines."""
+
+    focal_length_mm: Positive = 12.5
+    pixel_um: Positive = 9.9
+    width_px: Annotated[int, Field(ge=16)] = 658
+    height_px: Annotated[int, Field(ge=16)] = 494
+    rate_hz: Positive = 30.0
+    line_noise: Literal["edge-points", "endpoints"] = "edge-points"
+    """What is noisy: every point along a line, or only the two ends of what is seen of it."""
+    noise_px: NotNegative = 2.0**0.5
+    """1 σ of each noisy point, in u and in v."""
+    point_spacing_px: Positive = 1.0
+    """Between the points along a line, with ``edge-points``."""
+    min_line_px: Annotated[float, Field(ge=2.0)] = 8.0
+    """A shorter line is not reported."""
+    near_m: Positive = 1.0
+    """Depth of the near plane."""
+    outages_s: Annotated[tuple[WindowS, ...], BeforeValidator(_tuple_from_list)] = ()
+    """Windows [from, to] of time in which no line is reported."""
+
+    @model_validator(mode="after")
+    def _outages_in_order(self) -> Self:
+        for start, end in self.outages_s:
+            if not start < end:
+                raise _refused(f"each window must be [from, to] with from < to, not [{start:g}, {end:g}]", "outages_s")
+        for (_, end), (start, _) in pairwise(self.outages_s):
+            if start < end:
+                raise _refused(f"windows must follow each other: one begins at {start:g}, before {end:g}", "outages_s")
+        return self
+
+
+class ImuConfig(Section):
+    """``[imu]``: the one inertial unit; 1 σ each, drawn per seed and axis; a drift is a random walk."""
+
+    rate_hz: Positive = 120.0
+    gyro_bias_deg_h: NotNegative = 10.0
+    gyro_bias_drift_deg_h_sqrt_h: NotNegative = 3.0
+    """deg/h after one hour."""
+    gyro_noise_deg_sqrt_h: NotNegative = 0.1
+    """Angle random walk."""
+    accel_bias_mg: NotNegative = 1.0
+    accel_bias_drift_mg_sqrt_h: NotNegative = 0.3
+    """mg after one hour."""
+    accel_noise_mps_sqrt_h: NotNegative = 0.1
+    """Velocity random walk."""
+    scale_factor: Annotated[float, Field(ge=0.0, lt=0.5)] = 3e-4
+    """Relative, of each gyro and accelerometer."""
+
+
+class PitotConfig(Section):
+    """``[pitot]``: the airspeed measurement."""
+
+    noise_mps: NotNegative = 0.3
+    """1 σ of each sample."""
+    lag_s: NotNegative = 0.1
+    """Time constant."""
+
+
+class NavigationConfig(Section):
+    """``[navigation]``: how the filter starts, what it believes and when it gives up."""
+
+    start_frames: Annotated[int, Field(ge=2, le=1000)] = 15
+    """Camera frames from which the first state is made."""
+    start_speed_sigma_mps: Positive = 0.5
+    gate_early: Positive = 22.5
+    """Greatest normalised innovation squared of three lines, six numbers."""
+    gate_late: Positive = 18.5
+    """The same of two lines, four numbers."""
+    max_position_sigma_m: Positive = 500.0
+    """Diverged when the filter's own σ of the position passes this."""
+
+
+class SimulationConfig(Section):
+    """``[simulation]``: the plant's step and the longest flight."""
+
+    rate_hz: Annotated[float, Field(ge=20.0, le=10000.0)] = 120.0
+    """``imu.rate_hz`` and ``camera.rate_hz`` must divide it."""
+    time_limit_s: Annotated[float, Field(gt=0.0, le=36000.0)] = 120.0
+
+
+class BoxConfig(Section):
+    """``[box]``: what a good landing is.  It judges, and does not steer."""
+
+    along_min_m: float = 100.0
+    """Touchdown, past the threshold."""
+    along_max_m: float = 450.0
+    cross_max_m: NotNegative = 2.0
+    """Touchdown, either side of the centreline."""
+    sink_max_mps: NotNegative = 1.0
+    bank_max_deg: NotNegative = 3.0
+    stop_cross_max_m: NotNegative = 3.0
+
+    @model_validator(mode="after")
+    def _along_in_order(self) -> Self:
+        if not self.along_min_m < self.along_max_m:
+            raise _refused(f"must be above along_min_m = {self.along_min_m:g}, not {self.along_max_m:g}", "along_max_m")
+        return self
+
+
+class ScenarioFile(Section):
+    """Everything that a scenario file may say."""
+
+    kind: Literal["flight", "study"]
+    aircraft: AircraftChoice
+    runway: RunwayConfig = Field(default_factory=RunwayConfig)
+    approach: ApproachConfig = Field(default_factory=ApproachConfig)
+    start: StartConfig = Field(default_factory=StartConfig)
+    camera: CameraConfig = Field(default_factory=CameraConfig)
+    imu: ImuConfig = Field(default_factory=ImuConfig)
+    pitot: PitotConfig = Field(default_factory=PitotConfig)
+    navigation: NavigationConfig = Field(default_factory=NavigationConfig)
+    simulation: SimulationConfig = Field(default_factory=SimulationConfig)
+    box: BoxConfig = Field(default_factory=BoxConfig)
+
+    @model_validator(mode="after")
+    def _sections_agree(self) -> Self:
+        step_rate = self.simulation.rate_hz
+        for key, rate in (("imu.rate_hz", self.imu.rate_hz), ("camera.rate_hz", self.camera.rate_hz)):
+            steps = step_rate / rate
+            if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
+                raise _refused(f"must divide simulation.rate_hz = {step_rate:g}; {rate:g} does not", key)
+        if self.approach.aim_point_m >= self.runway.length_m:
+            length, aim_point = self.runway.length_m, self.approach.aim_point_m
+            raise _refused(f"must be below runway.length_m = {length:g}, not {aim_point:g}", "approach.aim_point_m")
+        return self
+
+
+class MountConfig(Section):
+    """``[mount]``: the camera's tilting mount.  Tilt is the optical axis' angle below the body's forward axis."""
+
+    position_body_m: PointM
+    """Projection centre from the centre of gravity: forward, right, down."""
+    tilt_early_deg: Annotated[float, Field(ge=-45.0, le=45.0)] = 3.0
+    tilt_late_deg: Annotated[float, Field(ge=-45.0, le=45.0)] = 10.0
+    tilt_rate_deg_s: Positive = 10.0
+    tilt_reading_sigma_deg: NotNegative = 0.005
+
+
+class GearConfig(Section):
+    """``[gear]``: where the wheels touch, unloaded, from the centre of gravity: forward, right, down."""
+
+    nose_wheel_body_m: PointM
+    left_wheel_body_m: PointM
+    right_wheel_body_m: PointM
+    sink_limit_mps: Positive = 3.0
+    """Touchdown beyond it is a crash."""
+
+
+class SpeedsConfig(Section):
+    """``[speeds]``: speeds to fly."""
+
+    approach_mps: Positive
+
+
+class ApproachGains(Section):
+    """``[guidance.approach]``: glide slope and localizer."""
+
+    trim_alpha_deg: Annotated[float, Field(ge=-30.0, le=30.0)]
+    """Angle of attack in trim at the approach speed."""
+    trim_alpha_slope_deg_per_mps: float
+    """Its change with airspeed."""
+    height_gain_per_s: NotNegative
+    """Sink rate asked for, per metre above the slope."""
+    pitch_gain_rad_per_mps: NotNegative
+    pitch_integral_rad_per_m: NotNegative
+    max_sink_mps: Positive
+    lateral_gain_per_s: NotNegative
+    """Lateral speed asked for, per metre off the centreline."""
+    lateral_speed_max_mps: Positive
+    bank_gain_per_s: NotNegative
+    """Lateral acceleration asked for, per m/s of lateral speed error."""
+    bank_max_deg: Annotated[float, Field(gt=0.0, le=60.0)]
+
+
+class FlareGains(Section):
+    """``[guidance.flare]``: sink rate (wheel height + bias) / time constant."""
+
+    height_m: Positive
+    """Wheel height at which the flare begins."""
+    time_constant_s: Positive
+    height_bias_m: NotNegative
+    touchdown_height_m: Positive = 0.05
+    """Wheel height, by navigation, below which the wheels are taken to be on the ground."""
+
+
+class RolloutGains(Section):
+    """``[guidance.rollout]``: from touchdown to the stop."""
+
+    pitch_rate_deg_s: Positive
+    """At which the nose is lowered."""
+    pitch_deg: Annotated[float, Field(ge=-10.0, le=10.0)] = -1.0
+    """Pitch command once the nose is down: it keeps weight on the nose wheel."""
+    brake_delay_s: NotNegative
+    brake: Fraction
+    heading_per_m: NotNegative
+    """Heading asked for (rad) per metre off the centreline."""
+    heading_max_deg: Annotated[float, Field(gt=0.0, le=45.0)] = 5.0
+    steering_gain: NotNegative
+    """Steering per radian of heading error."""
+    yaw_rate_gain_s: NotNegative
+    """Steering per rad/s of yaw rate, as damping."""
+    stop_speed_mps: Positive
+
+
+class GuidanceConfig(Section):
+    """``[guidance]``: gains by phase."""
+
+    approach: ApproachGains
+    flare: FlareGains
+    rollout: RolloutGains
+
+
+class AircraftFile(Section):
+    """Everything that an aircraft.toml may say."""
+
+    name: Annotated[str, Field(min_length=1)]
+    title: str
+    model: Annotated[str, Field(min_length=1)]
+    """The flight-dynamics model is ``<model>.xml`` in the same folder."""
+    mount: MountConfig
+    gear: GearConfig
+    speeds: SpeedsConfig
+    guidance: GuidanceConfig
+
+
+class AircraftConfig(AircraftFile):
+    """An aircraft as loaded."""
+
+    folder: Path
+    """Absolute; holds aircraft.toml and the model."""
+
+
+class Scenario(ScenarioFile):
+    """A scenario as loaded, with its aircraft; complete, so that a flight needs nothing else but a seed."""
+
+    name: str
+    """The file's name without its ending."""
+    path: Path
+    """The file it was read from, absolute."""
+    aircraft_config: AircraftConfig
+
+
+def field_names(model: type[Section], place: tuple[int | str, ...]) -> list[str]:
+    """The keys that are right in the table at a place below a model."""
+    for name in place:
+        field = model.model_fields.get(str(name))
+        inner = field.annotation if field else None
+        if not (isinstance(inner, type) and issubclass(inner, Section)):
+            return []
+        model = inner
+    return list(model.model_fields)
+
+
+def rows(section: Section, prefix: str = "") -> Iterator[tuple[str, object]]:
+    """Dotted key and value of everything in a model, in the file's order."""
+    for name in type(section).model_fields:
+        value = getattr(section, name)
+        if isinstance(value, Section):
+            yield from rows(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value

@@ -1,0 +1,165 @@
+"""Whole landings.
+
+What each case verifies:
+
+=========================================  ==========================================================================
+``test_landings[...]``                     a hundred seeds land in the box; fused beats raw vision in every quantity;
+                                           normalised errors squared are what a consistent filter's are, two-sided
+``test_same_seed_same_bits``               the log is a function of scenario and seed
+``test_blinded_camera_does_not_land``      nothing else than the camera brings the aircraft to the runway
+``test_never_seeing_camera``               without a first sight the flight ends by name, not by exception
+``test_no_trim``, ``test_divergence``      failures have names and keep their log
+``test_every_shipped_scenario``            what is shipped flies
+``test_elsewhere_on_the_earth``            another heading, latitude and elevation is the same landing
+=========================================  ==========================================================================
+"""
+
+import numpy as np
+import pytest
+
+import landsim
+from landsim.config import load_scenario
+from landsim.log import COLUMNS
+from landsim.metrics import find_touchdown
+from landsim.resources import shipped_scenarios
+from landsim.simulate import Flight
+from landsim.state import Phase, Stage
+
+SEEDS = 100
+PHASES = ("early", "late", "rollout")
+
+
+def fly(seed: int = 0, **overrides: object) -> Flight:
+    settings = {key.replace("__", "."): value for key, value in overrides.items()}
+    flight: Flight = landsim.fly(landsim.load_scenario("landing", overrides=settings), seed=seed)
+    return flight
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("line_noise", ["edge-points", "endpoints"])
+def test_landings(line_noise: str) -> None:
+    nees: dict[str, list[float]] = {phase: [] for phase in PHASES}
+    for seed in range(SEEDS):
+        flight = fly(seed, camera__line_noise=line_noise)
+        metrics = flight.metrics
+        where = f"{line_noise}, seed {seed}: {metrics['reason']}, {metrics['touchdown']}"
+        assert metrics["outcome"] == "landed", where
+        assert metrics["in_box"], where
+        touchdown = metrics["touchdown"]
+        assert 100.0 <= touchdown["x_m"] <= 450.0, where
+        assert abs(touchdown["y_m"]) <= 2.0, where
+        assert touchdown["sink_rate_mps"] <= 1.0, where
+        assert abs(touchdown["bank_deg"]) <= 3.0, where
+        assert abs(metrics["stop"]["y_m"]) <= 3.0, where
+        log = flight.log
+        first_main = np.flatnonzero((log["wow_left"] > 0) | (log["wow_right"] > 0))[0]
+        assert first_main < np.flatnonzero(log["wow_nose"] > 0)[0], where
+        for quantity, vision in metrics["navigation"]["vision"].items():
+            assert metrics["navigation"]["fused"][quantity]["rms"] < vision["rms"], f"{where}: {quantity}"
+        for phase in PHASES:
+            nees[phase].append(metrics["consistency"][phase]["nees9_mean"])
+    for phase, values in nees.items():
+        assert np.mean(values) == pytest.approx(9.0, rel=0.15), f"{line_noise}, {phase}: {np.mean(values):.2f}"
+
+
+def test_same_seed_same_bits() -> None:
+    first, again, other = fly(3), fly(3), fly(4)
+    assert list(first.log) == [column.name for column in COLUMNS]
+    for name, values in first.log.items():
+        assert values.tobytes() == again.log[name].tobytes(), name
+    assert first.log["fused_cross_m"].tobytes() != other.log["fused_cross_m"].tobytes()
+    for flight in (first, again):
+        flight.metrics.pop("wall_time_s")
+    assert first.metrics == again.metrics
+
+
+def test_phases_and_stages_come_in_order() -> None:
+    log = fly(1).log
+    phases = log["phase"]
+    assert (np.diff(phases) >= 0).all()
+    assert set(phases) >= {Phase.ACQUIRE, Phase.APPROACH, Phase.FLARE, Phase.ROLLOUT}
+    stages = log["stage"][log["phase"] >= Phase.APPROACH]
+    assert (stages[:1000] == Stage.EARLY).all(), "the threshold is in view"
+    assert (stages[-1000:] == Stage.LATE).all(), "the threshold is behind"
+    late = log["stage"] == Stage.LATE
+    frames = late & np.isfinite(log["vision_cross_m"])
+    assert np.isnan(log["vision_along_m"][frames]).all(), "two lines do not give the longitudinal position"
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_blinded_camera_does_not_land(seed: int) -> None:
+    """The same starts, the camera blind from one second on: dead reckoning of a tactical unit drifts off in 30 s."""
+    flight = fly(seed, camera__outages_s=[[1.0, 1000.0]])
+    assert flight.metrics["outcome"] != "landed"
+    log = flight.log
+    blind = log["time_s"] > 1.1
+    assert np.isnan(log["vision_cross_m"][blind]).all()
+    sigma = log["sigma_cross_m"][blind]
+    assert sigma[-1] > 3.0 * sigma[0], "the covariance grows while nothing is seen"
+    assert fly(seed).metrics["in_box"], "with its eyes open the same start lands"
+
+
+def test_never_seeing_camera() -> None:
+    flight = fly(0, camera__outages_s=[[0.0, 1000.0]])
+    assert flight.metrics["outcome"] in {"crashed", "off_runway", "timeout"}
+    assert (flight.log["phase"] == Phase.ACQUIRE).all()
+    assert np.isnan(flight.log["fused_cross_m"]).all()
+
+
+def test_no_trim() -> None:
+    """15 m/s is far below the stall speed of 27 m/s."""
+    flight = fly(0, start__speed_mps=15.0, start__speed_sigma_mps=0.0)
+    assert flight.metrics["outcome"] == "trim_failed"
+    assert "trim" in flight.metrics["reason"]
+    assert flight.metrics["touchdown"] is None
+    assert set(flight.log) == {column.name for column in COLUMNS}
+
+
+def test_divergence() -> None:
+    flight = fly(0, camera__outages_s=[[2.0, 1000.0]], navigation__max_position_sigma_m=5.0)
+    assert flight.metrics["outcome"] == "diverged"
+    assert flight.log["time_s"].size > 240
+    sigmas = [flight.log[f"sigma_{q}"][-1] for q in ("along_m", "cross_m", "height_m")]
+    assert np.hypot.reduce(sigmas) == pytest.approx(5.0, rel=0.05)
+
+
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_every_shipped_scenario(name: str) -> None:
+    scenario = load_scenario(name)
+    metrics = landsim.fly(scenario, seed=0).metrics
+    assert metrics["outcome"] == "landed"
+    assert metrics["in_box"]
+
+
+@pytest.mark.parametrize(
+    ("heading", "latitude", "longitude", "elevation"), [(245.0, 52.3, 4.8, 300.0), (10.0, -33.9, 151.2, 0.0)]
+)
+def test_elsewhere_on_the_earth(heading: float, latitude: float, longitude: float, elevation: float) -> None:
+    here = fly(5)
+    there = fly(
+        5,
+        runway__heading_deg=heading,
+        runway__latitude_deg=latitude,
+        runway__longitude_deg=longitude,
+        runway__elevation_m=elevation,
+    )
+    assert there.metrics["in_box"]
+    for metrics in (here.metrics, there.metrics):
+        assert metrics["navigation"]["fused"]["cross_m"]["rms"] < 0.2
+    a, b = here.metrics["touchdown"], there.metrics["touchdown"]
+    assert abs(a["y_m"] - b["y_m"]) < 0.5
+    assert abs(a["x_m"] - b["x_m"]) < 40.0
+
+
+def test_another_rate_of_camera_and_imu() -> None:
+    flight = fly(2, camera__rate_hz=10.0, imu__rate_hz=60.0)
+    assert flight.metrics["in_box"]
+
+
+def test_touchdown_is_the_first_contact() -> None:
+    flight = fly(0)
+    scenario = load_scenario("landing")
+    touchdown = find_touchdown(flight.log, scenario.aircraft_config)
+    assert touchdown is not None
+    before = flight.log["wheel_height_m"][touchdown.row - 1]
+    assert -0.02 < before < 0.02, "the wheels were at the ground the step before"

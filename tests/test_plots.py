@@ -1,0 +1,249 @@
+"""The pictures: they say what they show, with units, for any log, and leave nothing behind."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+from numpy.typing import NDArray
+from synthetic import empty_log, flight_log, parts
+
+from landsim import plots, report
+from landsim.metrics import Log, flight_metrics
+from landsim.plots import navigation, style
+
+Array = NDArray[np.float64]
+SCENARIO, AIRCRAFT = parts()
+FIGURES: dict[str, Callable[[Log, dict[str, Any]], Figure]] = {
+    "profile and plan": lambda log, metrics: plots.profile_and_plan(log, SCENARIO, metrics),
+    "navigation errors": plots.navigation_errors,
+    "attitude and controls": plots.controls_and_attitude,
+    "what the camera saw": lambda log, metrics: plots.camera_views(log, SCENARIO, metrics),
+    "consistency": lambda log, metrics: plots.consistency(log, SCENARIO, metrics),
+}
+PANELS = {
+    "profile and plan": 3,
+    "navigation errors": 8,
+    "attitude and controls": 8,
+    "what the camera saw": 12,
+    "consistency": 4,
+}
+"""The errors have two, and the consistency one, axis of distances besides."""
+
+
+@pytest.fixture(scope="module")
+def flight() -> dict[str, Array]:
+    return flight_log(np.random.default_rng(1))
+
+
+def measured(log: Log, end: str = "stopped") -> dict[str, Any]:
+    return flight_metrics(log, SCENARIO, AIRCRAFT, seed=7, end=end, wall_time_s=0.5, versions={})
+
+
+def text_of(figure: Figure) -> str:
+    return "\n".join(text.get_text() for text in figure.texts)
+
+
+def line(axes: Axes, label: str) -> tuple[Array, Array]:
+    """What a labelled line of a panel shows."""
+    (found,) = [artist for artist in axes.lines if artist.get_label() == label]
+    return np.asarray(found.get_xdata(), dtype=float), np.asarray(found.get_ydata(), dtype=float)
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_a_picture_says_what_it_shows_and_every_axis_has_a_unit(name: str, flight: dict[str, Array]) -> None:
+    figure = FIGURES[name](flight, measured(flight))
+    head = text_of(figure)
+    assert head.startswith("landing, seed 7: ")
+    assert name in head
+    assert "landed, in the box" in head
+    assert len(figure.axes) == PANELS[name]
+    for axes in figure.axes:
+        labels = [label for label in (axes.get_xlabel(), axes.get_ylabel()) if label]
+        for label in labels:
+            assert re.search(r", (m|s|px|m/s|°|° down)$|\(1\)$", label), label
+    assert sum(bool(axes.get_ylabel()) for axes in figure.axes) >= min(3, PANELS[name])
+
+
+SHORT = {
+    "no row": (0, "trim_failed"),
+    "one row": (1, "trim_failed"),
+    "two rows": (2, "diverged"),
+    "navigation never started": (400, "timeout"),
+}
+
+
+@pytest.mark.parametrize("case", SHORT)
+def test_pictures_of_a_log_with_next_to_nothing_in_it(case: str) -> None:
+    rows, end = SHORT[case]
+    log = empty_log(rows)
+    metrics = measured(log, end)
+    for name, draw in FIGURES.items():
+        figure = draw(log, metrics)
+        figure.draw_without_rendering()
+        assert name in text_of(figure)
+        assert f"{metrics['outcome']}: {metrics['reason']}" in text_of(figure)
+
+
+CUTS: dict[str, Callable[[dict[str, Array]], dict[str, Array]]] = {
+    "in the flare": lambda log: {name: values[:3200] for name, values in log.items()},
+    "the last row is the touchdown": lambda log: {name: values[: _touch(log) + 1] for name, values in log.items()},
+    "from the touchdown on": lambda log: {name: values[_touch(log) :] for name, values in log.items()},
+    "a hundred kilometres off": lambda log: log | {"true_cross_m": log["true_cross_m"] + 1e5},
+    "every filter column NaN at the end": lambda log: {
+        name: np.where(np.arange(values.size) > 3000, np.nan, values) if name.startswith(("fused", "sigma")) else values
+        for name, values in log.items()
+    },
+}
+
+
+def _touch(log: dict[str, Array]) -> int:
+    return int(np.flatnonzero(log["wow_left"])[0])
+
+
+@pytest.mark.parametrize("case", CUTS)
+def test_pictures_of_half_a_flight(case: str, flight: dict[str, Array]) -> None:
+    log = CUTS[case](flight)
+    metrics = measured(log, "timeout")
+    for draw in FIGURES.values():
+        draw(log, metrics).draw_without_rendering()
+
+
+def test_a_run_is_drawn_whole_and_nothing_else_is_left(flight: dict[str, Array], tmp_path: Path) -> None:
+    style_before = dict(mpl.rcParams)
+    (tmp_path / "camera.png").write_text("what stood there before")
+    paths = report.draw_run(tmp_path, SCENARIO, flight, measured(flight))
+    assert [path.name for path in paths] == list(report.PICTURES)
+    assert sorted(tmp_path.iterdir()) == sorted(paths)
+    for path in paths:
+        height, width = imread(path).shape[:2]
+        assert width == 10 * report.DPI
+        assert 7 * report.DPI < height < 10 * report.DPI
+    assert dict(mpl.rcParams) == style_before
+
+
+def test_a_picture_that_cannot_be_written_leaves_the_old_one(flight: dict[str, Array], tmp_path: Path) -> None:
+    (tmp_path / "profile.png").mkdir()  # a folder in the way: the rename fails, also for root
+    with pytest.raises(OSError, match=r"profile\.png"):
+        report.draw_run(tmp_path, SCENARIO, flight, measured(flight))
+    assert [path.name for path in tmp_path.iterdir()] == ["profile.png"]
+
+
+def test_profile_shows_the_log_against_the_slope_and_the_box(flight: dict[str, Array]) -> None:
+    metrics = measured(flight)
+    figure = plots.profile_and_plan(flight, SCENARIO, metrics)
+    side, plan, flare = figure.axes
+    x, height = line(side, "true")
+    np.testing.assert_allclose(height, np.interp(x, flight["true_along_m"], flight["true_height_m"]), atol=1e-9)
+    x, height = line(side, "3° glide slope")
+    # 1144 m before the aim point (the camera is a metre ahead of the start) the 3° line is 1144 tan 3° up
+    assert (x[1], height[1]) == (145.0, 0.0)
+    assert height[0] == pytest.approx((145.0 - x[0]) * 0.0524077793)
+    bottom, top = plan.get_ylim()
+    assert bottom > 15.0 > 0.0 > top  # from above, flying to the right: right of the centreline is down
+    x, height = line(flare, "touchdown")
+    assert x[0] == metrics["touchdown"]["x_m"]
+    assert f"{metrics['touchdown']['x_m']:.0f} m past the threshold" in flare.texts[0].get_text()
+
+
+def test_errors_are_estimate_less_truth_in_a_band_of_three_sigma(flight: dict[str, Array]) -> None:
+    figure = plots.navigation_errors(flight, measured(flight))
+    axes = next(a for a in figure.axes if a.get_ylabel() == "cross error, m")
+    time, shown = line(axes, "fused")
+    expected = np.interp(time, flight["time_s"], flight["fused_cross_m"] - flight["true_cross_m"])
+    np.testing.assert_allclose(shown, expected, atol=1e-12)
+    band = next(c for c in axes.collections if "3 σ" in str(c.get_label())).get_paths()[0].vertices
+    vertices = np.asarray(band)
+    assert vertices[:, 1].max() == pytest.approx(3.0 * np.nanmax(flight["sigma_cross_m"]), rel=1e-2)
+    assert vertices[:, 1].min() == pytest.approx(-3.0 * np.nanmax(flight["sigma_cross_m"]), rel=1e-2)
+    marks = {text.get_text(): text.xy[0] for text in axes.texts if hasattr(text, "xy")}
+    assert marks["touchdown"] == flight["time_s"][_touch(flight)]
+    assert marks["two lines"] == flight["time_s"][np.flatnonzero(flight["stage"] == 2)[0]]
+
+
+def test_signed_roots_there_and_back() -> None:
+    values = np.array([-9.0, -0.25, 0.0, 4.0])
+    np.testing.assert_array_equal(navigation.signed_root(values), [-3.0, -0.5, 0.0, 2.0])
+    np.testing.assert_array_equal(navigation.signed_square(navigation.signed_root(values)), values)
+
+
+@pytest.mark.parametrize(("value", "expected"), [(7.9, 5.0), (5.0, 5.0), (0.03, 0.02), (1.0, 1.0), (199.0, 100.0)])
+def test_ticks_are_round(value: float, expected: float) -> None:
+    assert navigation.round_below(value) == pytest.approx(expected, rel=1e-12)
+
+
+def test_six_moments_in_order(flight: dict[str, Array]) -> None:
+    figure = plots.camera_views(flight, SCENARIO, measured(flight))
+    images = [axes for axes in figure.axes if "px" in axes.get_xlabel()]
+    titles = [axes.get_title(loc="left") for axes in images]
+    starts = ["first lines", "600 m to go", "200 m to go", "last before hand-over", "flare", "rollout"]
+    assert [title.split(":")[0] for title in titles] == starts
+    assert all("three lines" in title for title in titles[:4])
+    assert all("two lines" in title for title in titles[4:])
+    for axes in images:
+        assert axes.get_xlim() == (-0.5, 657.5)
+        assert axes.get_ylim() == (493.5, -0.5)  # v is down
+        x, y = line(axes, "principal point")
+        assert (x[0], y[0]) == (328.5, 246.5)
+
+
+def test_six_moments_also_of_half_a_flight(flight: dict[str, Array]) -> None:
+    half = {name: values[:1200] for name, values in flight.items()}  # to 600 m before the threshold
+    figure = plots.camera_views(half, SCENARIO, measured(half, "timeout"))
+    titles = [axes.get_title(loc="left") for axes in figure.axes if "px" in axes.get_xlabel()]
+    assert [title.split(":")[0] for title in titles] == ["first lines", *["on the way"] * 4, "last lines"]
+    times = [float(title.split(": ")[1].split(" s")[0]) for title in titles]
+    assert np.all(np.diff(times) > 1.5)
+
+
+def test_a_landing_outside_the_box_says_by_what(flight: dict[str, Array]) -> None:
+    log = flight | {"body_y_m": flight["body_y_m"] + 2.0}
+    head = text_of(plots.navigation_errors(log, measured(log)))
+    assert "landed, outside the box: misses cross_max_m = 2 with 2.17" in head  # 0.17 m before
+    assert "stop_cross" not in head
+
+
+def test_the_end_of_all_lines_is_marked(flight: dict[str, Array]) -> None:
+    log = flight | {"stage": np.where(flight["time_s"] > 12.0, 0.0, flight["stage"])}
+    marks = {name: when for when, name in style.event_times(log, measured(log))}
+    assert marks == {"no more lines": 12.0, "touchdown": flight["time_s"][_touch(flight)]}
+
+
+def test_offsets_of_the_lines_by_hand() -> None:
+    """An upright edge, read 2 px to the right at its near and 1 px at its far end; a level threshold, 3 px down."""
+    log = empty_log(1)
+    log["stage"][0] = 1.0
+    for name, ends in {
+        "left_true": (100.0, 400.0, 100.0, 200.0),
+        "left_seen": (102.0, 400.0, 101.0, 200.0),
+        "threshold_true": (100.0, 400.0, 300.0, 400.0),
+        "threshold_seen": (100.0, 403.0, 300.0, 403.0),
+    }.items():
+        for end, value in zip(("u0", "v0", "u1", "v1"), ends, strict=True):
+            log[f"{name}_{end}"][0] = value
+    figure = plots.camera_views(log, SCENARIO, measured(log, "timeout"))
+    _, offsets = figure.axes
+    x, y = line(offsets, "offset of left")
+    np.testing.assert_allclose(x, [0.0, 1.0])
+    np.testing.assert_allclose(y, [2.0, 1.0])
+    np.testing.assert_allclose(line(offsets, "offset of threshold")[1], [3.0, 3.0])
+    assert line(offsets, "offset of right")[0].size == 0
+
+
+def test_a_long_log_is_thinned_and_keeps_its_ends() -> None:
+    log = {"time_s": np.arange(6001.0), "other": np.arange(6001.0) ** 2}
+    few = style.thinned(log)
+    assert few["time_s"].size <= 2 * style.POINTS
+    assert (few["time_s"][0], few["time_s"][-1]) == (0.0, 6000.0)
+    np.testing.assert_array_equal(few["other"], few["time_s"] ** 2)
+    assert style.thinned({"time_s": np.zeros(0)})["time_s"].size == 0
+
+
+def test_zero_has_no_sign() -> None:
+    assert [style.signed(value, 1) for value in (-0.04, 0.04, -0.06, 1.25)] == ["0.0", "0.0", "-0.1", "+1.2"]
