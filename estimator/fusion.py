@@ -6,7 +6,7 @@ zero.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
@@ -210,6 +210,8 @@ class InertialVisionFilter:
         self._ekf.x = self._zero
         self._ekf.P = start.covariance.copy()
         self._ekf.F = np.eye(strapdown.STATES)
+        # numbers are written to a view of the buffer at a tenth of what an index of the array costs
+        self._transition: Any = memoryview(self._ekf.F.reshape(-1))
         self._noise_dt = 0.0
         self._elapsed = 0.0
         self._fx = self._fy = self._fz = 0.0
@@ -244,7 +246,10 @@ class InertialVisionFilter:
         if abs(dt - self._noise_dt) > 1e-9:
             self._noise_dt = dt
             ekf.Q = strapdown.process_noise(self._noise, dt)
-        strapdown.transition(self.state.attitude, (self._fx, self._fy, self._fz), dt, out=ekf.F)
+        numbers = strapdown.transition(self.state.attitude, (self._fx, self._fy, self._fz), dt)
+        transition = self._transition
+        for place, number in zip(strapdown.TRANSITION_PLACES, numbers, strict=True):
+            transition[place] = number
         ekf.predict()
         self._elapsed = self._fx = self._fy = self._fz = 0.0
 

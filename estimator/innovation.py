@@ -177,9 +177,6 @@ def pose_innovation(
     """
     if lines.left is None or lines.right is None:
         return None
-    # one number that is not finite would spoil the whole state
-    if not all(math.isfinite(sum(line)) for line in lines if line is not None):
-        return None
     axes = camera_axes(attitude, tilt)
     (r0, r1, r2), _, forward = axes
     where = camera_position(position, attitude, mount.lever)
@@ -199,11 +196,15 @@ def pose_innovation(
             H = _late_state(H, secant, tangent, lateral, down)
     except (ZeroDivisionError, ValueError):
         return None
+    # one number that is not finite would spoil the whole state
+    if not math.isfinite(sum(residual) + sum(variance)):
+        return None
     J: Array = np.array(rows)
     # an error of the mount angle turns the camera about the body's y axis, which is its own x axis
-    R = np.dot(J * variance, J.T)
+    d, sigma2 = np.array((residual, variance))
+    R = np.dot(J * sigma2, J.T)
     R += (sway * mount.tilt_variance) * sway[:, None]
-    return Innovation(J.dot(residual), H, R)
+    return Innovation(np.dot(J, d), H, R)
 
 
 def _late_state(camera: Array, secant: float, tangent: float, lateral: float, down: float) -> Array:

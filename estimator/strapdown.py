@@ -152,8 +152,8 @@ def increments(
     )
 
 
-def transition(attitude: Mat3, force: Vec3, dt: float, out: Array) -> Array:
-    """Transition matrix of the 15 errors over several intervals of the inertial unit.
+def transition(attitude: Mat3, force: Vec3, dt: float) -> tuple[float, ...]:
+    """Transition matrix of the 15 errors over several intervals of the inertial unit: what it has besides its identity.
 
     To second order in time where a bias or the attitude moves velocity and position; what a gyro bias does to them
     within the time is of a higher order, and reaches them through the attitude in the next.
@@ -166,41 +166,42 @@ def transition(attitude: Mat3, force: Vec3, dt: float, out: Array) -> Array:
         Specific force in the runway frame, integrated over the time, m/s.
     dt : float
         s.
-    out : (15, 15) array
-        Written to; an identity matrix, or an earlier result of this function.
+
+    Returns
+    -------
+    tuple of float
+        The numbers at `TRANSITION_PLACES`.
     """
     x, y, z = force
     a, b, c, d, e, f, g, h, i = attitude
     n, k = -dt, 0.5 * dt
     m = k * n
-    out[_TRANSITION] = (
+    turn = (n * a, n * b, n * c, n * d, n * e, n * f, n * g, n * h, n * i)
+    return (
         dt, dt, dt,
         k * z, -k * y, -k * z, k * x, k * y, -k * x,
         m * a, m * b, m * c, m * d, m * e, m * f, m * g, m * h, m * i,
         z, -y, -z, x, y, -x,
-        n * a, n * b, n * c, n * d, n * e, n * f, n * g, n * h, n * i,
-        n * a, n * b, n * c, n * d, n * e, n * f, n * g, n * h, n * i,
+        *turn,
+        *turn,
     )  # fmt: skip
-    return out
 
 
-def _places(row: slice, column: slice, kind: str) -> list[tuple[int, int]]:
-    """Row and column of the numbers of a 3 × 3 block, row by row: its diagonal, what lies off it, or all."""
+def _places(row: slice, column: slice, kind: str) -> list[int]:
+    """Where the numbers of a 3 × 3 block lie in the matrix, row by row: its diagonal, what lies off it, or all."""
     chosen = {"diagonal": (True,), "skew": (False,), "full": (True, False)}[kind]
-    return [(row.start + i, column.start + j) for i in range(3) for j in range(3) if (i == j) in chosen]
+    return [STATES * (row.start + i) + column.start + j for i in range(3) for j in range(3) if (i == j) in chosen]
 
 
-_TRANSITION = tuple(
-    np.array(
-        _places(POSITION, VELOCITY, "diagonal")
-        + _places(POSITION, ATTITUDE, "skew")
-        + _places(POSITION, ACCEL_BIAS, "full")
-        + _places(VELOCITY, ATTITUDE, "skew")
-        + _places(VELOCITY, ACCEL_BIAS, "full")
-        + _places(ATTITUDE, GYRO_BIAS, "full")
-    ).T
+TRANSITION_PLACES = tuple(
+    _places(POSITION, VELOCITY, "diagonal")
+    + _places(POSITION, ATTITUDE, "skew")
+    + _places(POSITION, ACCEL_BIAS, "full")
+    + _places(VELOCITY, ATTITUDE, "skew")
+    + _places(VELOCITY, ACCEL_BIAS, "full")
+    + _places(ATTITUDE, GYRO_BIAS, "full")
 )
-"""Where `transition` writes."""
+"""Where the numbers of `transition` lie in the (15, 15) matrix, counted row by row."""
 
 
 def process_noise(noise: ImuNoise, dt: float) -> Array:

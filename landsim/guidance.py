@@ -155,9 +155,8 @@ def guide(law: Law, nav: NavState, state: GuidanceState) -> tuple[Command, Guida
     if phase is Phase.ACQUIRE:
         return _HANDS_OFF._replace(airspeed=law.approach_speed, tilt=law.tilt_early), state
     if phase is Phase.ROLLOUT or phase is Phase.STOPPED:
-        return _rollout(law, nav, state._replace(phase=phase))
-    tilted = state.tilted or threshold_leaves(law, nav)
-    return _descend(law, nav, state._replace(phase=phase, tilted=tilted))
+        return _rollout(law, nav, phase, state)
+    return _descend(law, nav, phase, state)
 
 
 _HANDS_OFF = Command(
@@ -172,8 +171,9 @@ def threshold_leaves(law: Law, nav: NavState) -> bool:
     return below_horizon > law.half_view + law.tilt_early - nav.pitch
 
 
-def _descend(law: Law, nav: NavState, state: GuidanceState) -> tuple[Command, GuidanceState]:
-    flare = state.phase is Phase.FLARE
+def _descend(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tuple[Command, GuidanceState]:
+    flare = phase is Phase.FLARE
+    tilted = state.tilted or threshold_leaves(law, nav)
     speed, sink = nav.velocity[0], nav.velocity[2]
     if flare:
         wanted = (max(wheel_height(law, nav), 0.0) + law.flare_bias) / law.flare_time
@@ -195,9 +195,9 @@ def _descend(law: Law, nav: NavState, state: GuidanceState) -> tuple[Command, Gu
         ground=False,
         steering=0.0,
         brake=0.0,
-        tilt=law.tilt_late if state.tilted else law.tilt_early,
+        tilt=law.tilt_late if tilted else law.tilt_early,
     )
-    return command, state._replace(sink_integral=integral, pitch=pitch)
+    return command, GuidanceState(phase, integral, pitch, 0.0, tilted)
 
 
 def bank_command(law: Law, cross: float, cross_speed: float) -> float:
@@ -222,7 +222,7 @@ def steering_command(law: Law, cross: float, yaw: float, yaw_rate: float) -> flo
     return max(-1.0, min(1.0, steering))
 
 
-def _rollout(law: Law, nav: NavState, state: GuidanceState) -> tuple[Command, GuidanceState]:
+def _rollout(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tuple[Command, GuidanceState]:
     time = state.rollout_time + law.dt
     start = state.pitch if state.rollout_time > 0.0 else nav.pitch
     pitch = max(law.rollout_pitch, start - law.lower_rate * law.dt)
@@ -237,4 +237,4 @@ def _rollout(law: Law, nav: NavState, state: GuidanceState) -> tuple[Command, Gu
         brake=law.brake if time > law.brake_delay else 0.0,
         tilt=law.tilt_early,
     )
-    return command, state._replace(pitch=pitch, rollout_time=time)
+    return command, GuidanceState(phase, state.sink_integral, pitch, time, state.tilted)

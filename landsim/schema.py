@@ -102,7 +102,7 @@ class CameraConfig(Section):
     """What is noisy: every point along a line, or only the two ends of what is seen of it."""
     noise_px: NotNegative = 2.0**0.5
     """1 σ of each noisy point, in u and in v."""
-    point_spacing_px: Positive = 1.0
+    point_spacing_px: Annotated[float, Field(ge=0.01)] = 1.0
     """Between the points along a line, with ``edge-points``."""
     min_line_px: Annotated[float, Field(ge=2.0)] = 8.0
     """A shorter line is not reported."""

@@ -5,6 +5,7 @@ do.
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -32,10 +33,8 @@ from landsim.units import (
     UM,
 )
 
-BLOCK = 1024
+BLOCK = 256
 """Samples of the inertial unit whose noise is drawn at once."""
-POINTS = 8192
-"""Points of lines whose noise is drawn at once, at least."""
 
 PixelSegment = tuple[float, float, float, float]
 
@@ -232,21 +231,9 @@ class LineCamera:
         self._lever = lever
         self._corners = (*runway.left_edge, *runway.right_edge)
         self._rng = rng
-        self._block = POINTS + int(math.hypot(config.width_px, config.height_px) / config.point_spacing_px) + 3
-        self._sums: Array = np.zeros((self._block + 1, 7))
-        self._used = self._block
-
-    def _draw(self) -> None:
-        """The noise of the next points, as running sums of what a line's fit needs of it.
-
-        With n_u and n_v the noise of point i, in units of σ: n_u, n_v, i n_u, i n_v, n_u², n_u n_v, n_v².  The sums
-        over the points of a line are differences of two rows.
-        """
-        u, v = self._rng.standard_normal((2, self._block))
-        place = np.arange(self._block)
-        terms = np.stack((u, v, place * u, place * v, u * u, u * v, v * v), axis=-1)
-        np.cumsum(terms, axis=0, out=self._sums[1:])
-        self._used = 0
+        most = 3 * (int(math.hypot(config.width_px, config.height_px) / config.point_spacing_px) + 3)
+        self._places = np.arange(most, dtype=float)
+        self._terms: Array = np.empty((7, most))
 
     def view(self, truth: Truth, tilt: float, tilt_reading: float) -> View:
         """The image at an instant, with the true and the read mount angle (rad)."""
@@ -259,7 +246,7 @@ class LineCamera:
         time = truth.time
         if any(start <= time < end for start, end in self._config.outages_s):
             return View(CameraFrame(time, None, None, None, tilt_reading), ends)
-        left, threshold, right = (None if seen is None else self._read(seen) for seen in ends)
+        left, threshold, right = self._read(ends)
         return View(CameraFrame(time, left, threshold, right, tilt_reading), ends)
 
     def _in_camera(self, truth: Truth, tilt: float) -> list[Vec3]:
@@ -278,32 +265,68 @@ class LineCamera:
             return None
         return seen
 
-    def _read(self, seen: PixelSegment) -> LineReading:
-        """A line fitted to noisy points: both ends, or points evenly spread between them.
+    def _read(self, ends: Sequence[PixelSegment | None]) -> list[LineReading | None]:
+        """Lines fitted to noisy points: both ends of each, or points evenly spread between them."""
+        numbers = [0 if seen is None else self._number(seen) for seen in ends]
+        firsts = [0, numbers[0], numbers[0] + numbers[1]]
+        total = sum(numbers)
+        if total == 0:
+            return [None, None, None]
+        # all lines at once: n_u, n_v, i n_u, i n_v, n_u², n_u n_v, n_v² of each point i, with its noise n in units of
+        # σ, # summed over the points of each line
+        noise = self._rng.standard_normal((2, total))
+        terms = self._terms[:, :total]
+        terms[:2] = noise
+        np.multiply(noise, self._places[:total], out=terms[2:4])
+        np.multiply(noise, noise[0], out=terms[4:6])
+        np.multiply(noise[1], noise[1], out=terms[6])
+        there = [i for i in range(3) if numbers[i]]
+        sums = np.add.reduceat(terms, [firsts[i] for i in there], axis=1).T.tolist()
+        readings: list[LineReading | None] = [None, None, None]
+        for i, summed in zip(there, sums, strict=True):
+            seen = ends[i]
+            assert seen is not None
+            readings[i] = _fitted(seen, numbers[i], firsts[i], self._config.noise_px, summed)
+        return readings
 
-        The moments that the fit needs are those of the points, p_i = middle + (i - (N-1)/2) step + σ noise_i,
-        multiplied out.
-        """
-        u0, v0, u1, v1 = seen
-        number = 2
-        if self._config.line_noise == "edge-points":
-            number = max(2, int(math.hypot(u1 - u0, v1 - v0) / self._config.point_spacing_px) + 1)
-        if self._used + number > self._block:
-            self._draw()
-        first = self._used
-        self._used = last = first + number
-        nu, nv, ku, kv, nuu, nuv, nvv = (self._sums[last] - self._sums[first]).tolist()
-        middle = first + 0.5 * (number - 1)
-        ku, kv = ku - middle * nu, kv - middle * nv
-        du, dv = (u1 - u0) / (number - 1), (v1 - v0) / (number - 1)
-        places = number * (number * number - 1) / 12.0  # Σ (i - middle)²
-        sigma = self._config.noise_px
-        square = sigma * sigma
-        u, v = 0.5 * (u0 + u1) + sigma * nu / number, 0.5 * (v0 + v1) + sigma * nv / number
-        suu = du * du * places + 2.0 * sigma * du * ku + square * (nuu - nu * nu / number)
-        suv = du * dv * places + sigma * (du * kv + dv * ku) + square * (nuv - nu * nv / number)
-        svv = dv * dv * places + 2.0 * sigma * dv * kv + square * (nvv - nv * nv / number)
-        a, b, c, spread = line_from_moments(u, v, suu, suv, svv, math)
-        off0, off1 = a * u0 + b * v0 + c, a * u1 + b * v1 + c
-        ends = (u0 - off0 * a, v0 - off0 * b, u1 - off1 * a, v1 - off1 * b)
-        return LineReading(a, b, c, u, v, spread, number, ends)
+    def _number(self, seen: PixelSegment) -> int:
+        """How many points a line is fitted to."""
+        if self._config.line_noise == "endpoints":
+            return 2
+        return max(2, int(math.hypot(seen[2] - seen[0], seen[3] - seen[1]) / self._config.point_spacing_px) + 1)
+
+
+def _fitted(seen: PixelSegment, number: int, first: int, sigma: float, sums: Sequence[float]) -> LineReading:
+    """A line fitted to its points.
+
+    The moments that the fit needs are those of the points, p_i = middle + (i - (N-1)/2) step + σ noise_i, multiplied
+    out.
+
+    Parameters
+    ----------
+    seen : PixelSegment
+        The true ends.
+    number : int
+        Of its points.
+    first : int
+        The i of its first point in the sums.
+    sigma : float
+        Of the points, px.
+    sums : sequence of float
+        Of n_u, n_v, i n_u, i n_v, n_u², n_u n_v and n_v².
+    """
+    u0, v0, u1, v1 = seen
+    nu, nv, ku, kv, nuu, nuv, nvv = sums
+    middle = first + 0.5 * (number - 1)
+    ku, kv = ku - middle * nu, kv - middle * nv
+    du, dv = (u1 - u0) / (number - 1), (v1 - v0) / (number - 1)
+    places = number * (number * number - 1) / 12.0  # Σ (i - middle)²
+    square = sigma * sigma
+    u, v = 0.5 * (u0 + u1) + sigma * nu / number, 0.5 * (v0 + v1) + sigma * nv / number
+    suu = du * du * places + 2.0 * sigma * du * ku + square * (nuu - nu * nu / number)
+    suv = du * dv * places + sigma * (du * kv + dv * ku) + square * (nuv - nu * nv / number)
+    svv = dv * dv * places + 2.0 * sigma * dv * kv + square * (nvv - nv * nv / number)
+    a, b, c, spread = line_from_moments(u, v, suu, suv, svv, math)
+    off0, off1 = a * u0 + b * v0 + c, a * u1 + b * v1 + c
+    ends = (u0 - off0 * a, v0 - off0 * b, u1 - off1 * a, v1 - off1 * b)
+    return LineReading(a, b, c, u, v, spread, number, ends)
