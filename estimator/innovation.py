@@ -185,26 +185,26 @@ def pose_innovation(
         residual, variance, equations = frame_residuals(camera, width, lines, where, axes)
         if lines.threshold is not None:
             rows = early_rows(where, width, *equations)
-            sway = np.array((0.0, 0.0, 0.0, r0, r1, r2))
+            sway: tuple[float, ...] = (0.0, 0.0, 0.0, r0, r1, r2)
         else:
             rows = late_rows(where, forward, width, *equations)
             tangent = forward[1] / forward[0]
             secant = math.hypot(forward[0], forward[1]) / forward[0]
             lateral, down = roll_share(where, width)
             about_x = r0 + tangent * r1
-            sway = np.array((r2, secant * r1, lateral * about_x, down * about_x))
+            sway = (r2, secant * r1, lateral * about_x, down * about_x)
             H = _late_state(H, secant, tangent, lateral, down)
     except (ZeroDivisionError, ValueError):
         return None
     # one number that is not finite would spoil the whole state
     if not math.isfinite(sum(residual) + sum(variance)):
         return None
-    J: Array = np.array(rows)
-    # an error of the mount angle turns the camera about the body's y axis, which is its own x axis
+    # an error of the mount angle, one more residual, turns the camera about the body's y axis, which is its own x axis
+    residual.append(0.0)
+    variance.append(mount.tilt_variance)
+    J = np.array([(*row, turn) for row, turn in zip(rows, sway, strict=True)])
     d, sigma2 = np.array((residual, variance))
-    R = np.dot(J * sigma2, J.T)
-    R += (sway * mount.tilt_variance) * sway[:, None]
-    return Innovation(np.dot(J, d), H, R)
+    return Innovation(np.dot(J, d), H, np.dot(J * sigma2, J.T))
 
 
 def _late_state(camera: Array, secant: float, tangent: float, lateral: float, down: float) -> Array:

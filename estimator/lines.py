@@ -58,7 +58,7 @@ def fit_variances(spread: Number, points: Number, sigma: float) -> tuple[Number,
     noise = sigma * sigma
     kept = spread - (points - 1.0) * noise
     floor = 0.1 * spread
-    lever = kept if isinstance(kept, float) and kept > floor else np.maximum(kept, floor)
+    lever = max(kept, floor) if isinstance(kept, float) else np.maximum(kept, floor)
     return noise / points, noise / lever
 
 
