@@ -9,8 +9,10 @@ import pytest
 from numpy.random import default_rng
 
 from estimator import PinholeCamera, three_line_pose, two_line_pose
-from estimator.fusion import Gates, InertialVisionFilter, Start
-from estimator.innovation import LineObservation, Lines, Mount
+from estimator.alignment import Start
+from estimator.fusion import Gates, InertialVisionFilter
+from estimator.innovation import LineObservation, Lines
+from estimator.mount import Mount
 from estimator.so3 import IDENTITY, Array
 from estimator.strapdown import ImuNoise, Inertial, Site
 

@@ -41,8 +41,15 @@ three_line          early stage: pose from both edges and the threshold
 two_line            late stage: yaw, pitch, lateral position and height from both edges and a roll angle
 covariance          first-order covariance of either pose
 strapdown           inertial mechanisation and its error model
+pose                what the two solvers return
+mount               how the camera sits on the body
 innovation          a camera frame as a measurement of the filter's errors
-fusion              the filter and its start; not imported from here, since filterpy takes a second to import
+alignment           the start of the filter
+fusion              the filter; not imported from here, since filterpy takes a second to import
+
+The measurement that the filter takes from a frame is the vision pose less the predicted one, to first order in the
+lines at the predicted pose: two or three lines and the four or six numbers of the pose fix one another there, and the
+lines are where the noise is Gaussian.
 
 The solvers are those of F. Li, D. Tang, N. Shen, "Vision-based pose estimation of UAV from line correspondences",
 Procedia Engineering 15 (2011) 578-584, doi:10.1016/j.proeng.2011.08.109.

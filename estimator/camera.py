@@ -61,6 +61,11 @@ class PinholeCamera:
             Of the lens, and pitch of the pixels, in the same unit.
         width, height : int
             px.
+
+        Raises
+        ------
+        ValueError
+            If the pixel pitch is not above zero, and as the class itself.
         """
         if not pixel > 0:
             raise ValueError(f"PinholeCamera: the pixel pitch must be above zero, not {pixel!r}")

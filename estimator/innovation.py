@@ -27,6 +27,7 @@ from estimator.covariance import (
     predicted_line,
     roll_share,
 )
+from estimator.mount import Mount, camera_axes, camera_position, camera_triads
 from estimator.so3 import Array, Mat3, Vec3, rotate
 from estimator.strapdown import ATTITUDE, POSITION, STATES
 
@@ -55,41 +56,12 @@ class Lines(NamedTuple):
     right: LineObservation | None
 
 
-class Mount(NamedTuple):
-    """How the camera sits on the body."""
-
-    lever: Vec3
-    """Projection centre from the inertial unit, body frame, m."""
-    tilt_variance: float
-    """Of the mount angle as read, rad², white from frame to frame."""
-
-
 class Innovation(NamedTuple):
     """A measurement of the 15-state error: y = H δ + noise of covariance R."""
 
     y: Array
     H: Array
     R: Array
-
-
-def camera_axes(attitude: Mat3, tilt: float) -> tuple[Vec3, Vec3, Vec3]:
-    """The camera's x, y and z axes in the runway frame: the rows of R_cam_from_runway.
-
-    The mount turns about the body's y axis; `tilt` (rad) is how far the optical axis points below the body's x axis.
-    """
-    s, c = math.sin(tilt), math.cos(tilt)
-    f0, r0, d0, f1, r1, d1, f2, r2, d2 = attitude
-    return (
-        (r0, r1, r2),
-        (c * d0 - s * f0, c * d1 - s * f1, c * d2 - s * f2),
-        (c * f0 + s * d0, c * f1 + s * d1, c * f2 + s * d2),
-    )
-
-
-def camera_position(position: Vec3, attitude: Mat3, lever: Vec3) -> Vec3:
-    """The projection centre, runway frame, m."""
-    x, y, z = rotate(attitude, lever)
-    return position[0] + x, position[1] + y, position[2] + z
 
 
 def camera_from_state(attitude: Mat3, lever: Vec3) -> Array:
@@ -155,7 +127,7 @@ def frame_residuals(
 def pose_innovation(
     camera: PinholeCamera, width: float, mount: Mount, lines: Lines, position: Vec3, attitude: Mat3, tilt: float
 ) -> Innovation | None:
-    """Vision pose less predicted pose: six numbers with the threshold in view, four without, None without both edges.
+    """Vision pose less predicted pose, to first order in the lines: six numbers, or four without the threshold.
 
     Parameters
     ----------
@@ -173,7 +145,7 @@ def pose_innovation(
     -------
     Innovation or None
         Early: position (m) and rotation vector (rad) of the camera, runway frame.  Late: yaw, pitch (rad), y and z (m).
-        None also where the prediction sees no such lines.
+        None without both edges, where the prediction sees no such lines, and where a number is not finite.
     """
     if lines.left is None or lines.right is None:
         return None
@@ -241,8 +213,7 @@ def camera_sigma(covariance: Array, attitude: Array, mount: Mount, tilt: Array) 
     (n, 6) array
         x, y, z (m), roll, pitch and yaw (rad) of the camera triad in the runway frame.
     """
-    s, c = np.sin(tilt)[:, None], np.cos(tilt)[:, None]
-    forward = c * attitude[:, :, 0] + s * attitude[:, :, 2]
+    forward = camera_triads(attitude, tilt)[:, :, 0]
     level = np.hypot(forward[:, 0], forward[:, 1])
     ahead = forward / level[:, None]
     rise = -ahead[:, 2]

@@ -44,22 +44,25 @@ class LineFit:
         # a turn by φ moves (a, b) to (a, b) + φ (-b, a) and keeps the line through its centroid
         turn = np.stack((-b, a, b * u - a * v), axis=-1)
         offset_variance, angle_variance = fit_variances(self.spread, self.points, sigma)
-        covariance = np.asarray(angle_variance)[..., None, None] * turn[..., :, None] * turn[..., None, :]
+        with np.errstate(invalid="ignore"):  # a line of one point: infinity times the zeros of its turn
+            covariance = np.asarray(angle_variance)[..., None, None] * turn[..., :, None] * turn[..., None, :]
         covariance[..., 2, 2] += offset_variance
         return covariance
 
 
 def fit_variances(spread: Number, points: Number, sigma: float) -> tuple[Number, Number]:
-    """Variances of a fitted line's offset at its centroid (px²) and of its angle (rad²).
+    """Variances of a fitted line's offset at its centroid (px²) and of its angle (rad², infinite for a single point).
 
     The spread as measured holds the noise along the line too, (N - 1) σ² of it, which is no lever arm: it is taken off,
     down to a tenth of the measured value where the points are all noise.
     """
     noise = sigma * sigma
-    kept = spread - (points - 1.0) * noise
-    floor = 0.1 * spread
-    lever = max(kept, floor) if isinstance(kept, float) else np.maximum(kept, floor)
-    return noise / points, noise / lever
+    kept, floor = spread - (points - 1.0) * noise, 0.1 * spread
+    if isinstance(spread, float):
+        return noise / points, noise / max(kept, floor) if spread > 0.0 else math.inf
+    with np.errstate(divide="ignore", invalid="ignore"):
+        angle = noise / np.maximum(kept, floor)
+    return noise / points, np.where(np.asarray(spread) > 0.0, angle, math.inf)
 
 
 def line_from_moments(
@@ -108,12 +111,3 @@ def fit_line(points: ArrayLike) -> LineFit:
         centroid[..., 0], centroid[..., 1], scatter[..., 0, 0], scatter[..., 0, 1], scatter[..., 1, 1], np
     )
     return LineFit(np.stack((a, b, c), axis=-1), centroid, np.asarray(spread), points.shape[-2])
-
-
-def line_through(u0: float, v0: float, u1: float, v1: float) -> tuple[float, float, float]:
-    """The line (a, b, c) through two pixels, a² + b² = 1; NaN where the two coincide."""
-    length = math.hypot(u1 - u0, v1 - v0)
-    if length == 0.0:
-        return math.nan, math.nan, math.nan
-    a, b = -(v1 - v0) / length, (u1 - u0) / length
-    return a, b, -(a * u0 + b * v0)

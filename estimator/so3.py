@@ -1,7 +1,7 @@
 """Rotations on plain numbers: 3-vectors as 3-tuples, 3 × 3 matrices as 9-tuples, row by row.
 
 A small array costs more to allocate than to compute with, so what runs at the rate of the inertial unit works on
-tuples of floats.  Every function is pure; ``array3`` and ``flat`` cross over to numpy.
+tuples of floats.  Every function is pure.
 """
 
 import math
@@ -15,11 +15,6 @@ Mat3: TypeAlias = tuple[float, float, float, float, float, float, float, float, 
 Array: TypeAlias = NDArray[np.float64]
 
 IDENTITY: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-
-
-def array3(matrix: Mat3) -> Array:
-    """The 9-tuple as a (3, 3) array."""
-    return np.array(matrix).reshape(3, 3)
 
 
 def flat(matrix: ArrayLike) -> Mat3:
@@ -68,11 +63,6 @@ def rotate_back(a: Mat3, v: Vec3) -> Vec3:
         a[1] * x + a[4] * y + a[7] * z,
         a[2] * x + a[5] * y + a[8] * z,
     )
-
-
-def cross(a: Vec3, b: Vec3) -> Vec3:
-    """The vector product a × b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def exp(vector: Vec3) -> Mat3:

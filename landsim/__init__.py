@@ -31,8 +31,8 @@ A module imports from those below it only; a contract in the checks holds this.
 ``cli``                              parses arguments and prints; ``tables`` is the table at the end of a flight
 ``report``, ``plots``                pictures; the only ones that import matplotlib
 ``runs``                             run folders, written whole or not at all
-``simulate``, ``recorder``           the loop, and what it keeps of a flight; the only ones that hold truth and
-navigation ``modes``                            the aircraft's modes, from JSBSim's own linearisation
+``simulate``, ``recorder``           the loop and what it keeps: the only ones that hold truth and navigation both
+``modes``                            the aircraft's modes, from JSBSim's own linearisation
 ``plant``                            JSBSim, and the only one that imports it; feet, slugs and degrees end here
 ``sensors``                          truth to measurements: camera lines, one IMU, pitot
 ``navigation``                       drives the estimator and its filter

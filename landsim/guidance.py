@@ -30,6 +30,8 @@ class Law:
     height_gain: float
     pitch_gain: float
     pitch_integral: float
+    integral_max: float
+    """Most of the sink rate's integral, m."""
     max_sink: float
     lateral_gain: float
     lateral_speed_max: float
@@ -54,6 +56,7 @@ class Law:
     """Projection centre, body frame, m."""
     tilt_early: float
     tilt_late: float
+    tilt_rollout: float
     half_view: float
     """From the optical axis to the image's lower edge, rad."""
 
@@ -61,7 +64,6 @@ class Law:
 def law_of(aircraft: AircraftConfig, approach: ApproachConfig, gravity: float, half_view: float, dt: float) -> Law:
     """The law of an aircraft's gains on an approach."""
     a, f, r = aircraft.guidance.approach, aircraft.guidance.flare, aircraft.guidance.rollout
-    left, right = aircraft.gear.left_wheel_body_m, aircraft.gear.right_wheel_body_m
     return Law(
         dt=dt,
         gravity=gravity,
@@ -73,6 +75,7 @@ def law_of(aircraft: AircraftConfig, approach: ApproachConfig, gravity: float, h
         height_gain=a.height_gain_per_s,
         pitch_gain=a.pitch_gain_rad_per_mps,
         pitch_integral=a.pitch_integral_rad_per_m,
+        integral_max=a.pitch_integral_max_deg * DEG / max(a.pitch_integral_rad_per_m, 1e-9),
         max_sink=a.max_sink_mps,
         lateral_gain=a.lateral_gain_per_s,
         lateral_speed_max=a.lateral_speed_max_mps,
@@ -91,10 +94,11 @@ def law_of(aircraft: AircraftConfig, approach: ApproachConfig, gravity: float, h
         steering_gain=r.steering_gain,
         yaw_rate_gain=r.yaw_rate_gain_s,
         stop_speed=r.stop_speed_mps,
-        wheels=(0.5 * (left[0] + right[0]), 0.5 * (left[1] + right[1]), 0.5 * (left[2] + right[2])),
+        wheels=aircraft.gear.main_wheels_body_m,
         camera=aircraft.mount.position_body_m,
         tilt_early=aircraft.mount.tilt_early_deg * DEG,
         tilt_late=aircraft.mount.tilt_late_deg * DEG,
+        tilt_rollout=aircraft.mount.tilt_rollout_deg * DEG,
         half_view=half_view,
     )
 
@@ -110,7 +114,7 @@ class GuidanceState(NamedTuple):
     rollout_time: float
     """Since touchdown, s."""
     tilted: bool
-    """The mount has been told to tilt: it is told once."""
+    """The mount has been told to tilt for the late stage: in the air it is not told back."""
 
 
 INITIAL = GuidanceState(Phase.ACQUIRE, 0.0, 0.0, 0.0, False)
@@ -182,7 +186,7 @@ def _descend(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tup
         wanted = speed * law.slope + law.height_gain * above
     wanted = max(-law.max_sink, min(law.max_sink, wanted))
     error = sink - wanted
-    integral = state.sink_integral + error * law.dt
+    integral = max(-law.integral_max, min(law.integral_max, state.sink_integral + error * law.dt))
     airspeed = max(nav.airspeed, 0.5 * law.approach_speed)
     alpha = law.trim_alpha + law.trim_alpha_slope * (airspeed - law.approach_speed)
     pitch = alpha - wanted / airspeed + law.pitch_gain * error + law.pitch_integral * integral
@@ -235,6 +239,6 @@ def _rollout(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tup
         ground=True,
         steering=steering_command(law, nav.position[1], nav.yaw, nav.rate[2]),
         brake=law.brake if time > law.brake_delay else 0.0,
-        tilt=law.tilt_early,
+        tilt=law.tilt_rollout,
     )
     return command, GuidanceState(phase, state.sink_integral, pitch, time, state.tilted)

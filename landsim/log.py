@@ -86,6 +86,7 @@ COLUMNS: tuple[Column, ...] = (
     Column("brake", "1", "", "0 to 1"),
     Column("steering", "1", "", "-1 to 1, right positive"),
     Column("tilt_deg", "deg", "", "true mount angle of the camera, down positive"),
+    Column("tilt_reading_deg", "deg", "", "the same as read"),
     Column("wow_nose", "1", "", "1 with weight on the nose wheel"),
     Column("wow_left", "1", "", "1 with weight on the left main wheel"),
     Column("wow_right", "1", "", "1 with weight on the right main wheel"),

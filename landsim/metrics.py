@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from landsim.log import QUANTITIES
-from landsim.state import Phase, Stage
+from landsim.state import Phase
 from landsim.units import DEG
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ CRASHES = {
 """Those of the ends that are a crash, and what to say of it."""
 BEGIN = -1000.0
 """Tracking and navigation count from here: along the runway, m."""
+EARLY_NUMBERS, LATE_NUMBERS = 6, 4
+"""Degrees of freedom of a measurement of three lines, and of two."""
 BOUNCE_S = 0.1
 """Both main wheels in the air for longer than this, between contacts, is a bounce."""
 
@@ -88,8 +90,7 @@ def main_wheels(log: Log, aircraft: "AircraftConfig") -> tuple[Array, Array]:
 
     R_runway_from_body is that of ``estimator.so3.from_euler``; m is the wheels' mean position in body axes.
     """
-    left, right = aircraft.gear.left_wheel_body_m, aircraft.gear.right_wheel_body_m
-    f, r, d = (0.5 * (a + b) for a, b in zip(left, right, strict=True))
+    f, r, d = aircraft.gear.main_wheels_body_m
     roll, pitch, yaw = (log[f"body_{angle}_deg"] * DEG for angle in ("roll", "pitch", "yaw"))
     sr, cr, sp, cp, sy, cy = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch), np.sin(yaw), np.cos(yaw)
     ahead = cp * f + sr * sp * r + cr * sp * d  # the components level ahead and level right of the nose
@@ -137,10 +138,25 @@ def count_bounces(log: Log) -> int:
     return int(np.sum(airborne > BOUNCE_S + 0.5 * step))  # counted in steps: rounding of the times must not decide
 
 
-def judge(log: Log, scenario: "Scenario", aircraft: "AircraftConfig", end: str, touchdown: Touchdown | None) -> Verdict:
+def judge(
+    log: Log,
+    scenario: "Scenario",
+    aircraft: "AircraftConfig",
+    end: str,
+    touchdown: Touchdown | None,
+    detail: str = "",
+) -> Verdict:
     """The outcome of a flight by the first thing that went wrong, or ``landed`` if nothing did.
 
     What happened at the wheels happened before the loop's end, or with it: a crash in the same row counts first.
+
+    Parameters
+    ----------
+    log, scenario, aircraft, end
+        As for `flight_metrics`.
+    touchdown : Touchdown or None
+    detail : str
+        What the loop says of its end.
 
     Raises
     ------
@@ -150,16 +166,16 @@ def judge(log: Log, scenario: "Scenario", aircraft: "AircraftConfig", end: str, 
     if end not in ENDS:
         raise ValueError(f"end: {end!r} is not one of {', '.join(ENDS)}")
     if end == "trim_failed":
-        return Verdict("trim_failed", "JSBSim found no trim at the start")
+        return Verdict("trim_failed", detail or "JSBSim found no trim at the start")
     if end == "error":
-        return Verdict("error", "the simulation failed")
+        return Verdict("error", detail or "the simulation failed")
     faults = _contact_faults(log, scenario, aircraft, touchdown)
     if end in CRASHES:
         faults.insert(0, (log["time_s"].size - 1, Verdict("crashed", CRASHES[end])))
     if faults:
         return min(faults, key=lambda fault: fault[0])[1]
     if end == "diverged":
-        return Verdict("diverged", "the navigation filter diverged")
+        return Verdict("diverged", "the navigation filter diverged" + (f": {detail}" if detail else ""))
     if end == "timeout":
         where = "in the air" if touchdown is None else "still rolling"
         return Verdict("timeout", f"{where} at the time limit of {scenario.simulation.time_limit_s:g} s")
@@ -224,19 +240,27 @@ def navigation_errors(log: Log, end_row: int) -> dict[str, dict[str, dict[str, A
 
 
 def consistency(log: Log, touchdown: Touchdown | None) -> dict[str, dict[str, Any]]:
-    """Mean normalised errors squared, and over how many frames: early and late in the air, and in the rollout."""
+    """Mean normalised errors squared by phase: early and late in the air, coasting in the air, and the rollout.
+
+    A frame is early or late by the measurement that it offered, whether the gate let it pass or not; ``rejected`` says
+    how many it did not.  Coasting frames offered none.
+    """
     rows = np.arange(log["time_s"].size)
     airborne = rows < (rows.size if touchdown is None else touchdown.row)
+    frame = np.isfinite(log["nees9"])
+    offered = log["nis_dof"]
     phases = {
-        "early": airborne & (log["stage"] == Stage.EARLY),
-        "late": airborne & (log["stage"] == Stage.LATE),
-        "rollout": ~airborne & (log["phase"] < Phase.STOPPED),
+        "early": frame & airborne & (offered == EARLY_NUMBERS),
+        "late": frame & airborne & (offered == LATE_NUMBERS),
+        "coasting": frame & airborne & np.isnan(offered),
+        "rollout": frame & ~airborne & (log["phase"] < Phase.STOPPED),
     }
     return {
         name: {
             "nees9_mean": _mean(log["nees9"][rows_of]),
             "nees15_mean": _mean(log["nees15"][rows_of]),
-            "frames": int(np.sum(np.isfinite(log["nees9"][rows_of]))),
+            "frames": int(np.sum(rows_of)),
+            "rejected": int(np.sum(log["accepted"][rows_of] == 0.0)),
         }
         for name, rows_of in phases.items()
     }
@@ -251,6 +275,7 @@ def flight_metrics(
     end: str,
     wall_time_s: float,
     versions: Mapping[str, str],
+    detail: str = "",
 ) -> dict[str, Any]:
     """All that metrics.json holds.
 
@@ -268,6 +293,8 @@ def flight_metrics(
         What the flight took.
     versions : mapping of str to str
         Of the libraries in use.
+    detail : str
+        What the loop says of its end.
 
     Returns
     -------
@@ -283,7 +310,7 @@ def flight_metrics(
         If ``end`` is not one of ``ENDS``.
     """
     touchdown = find_touchdown(log, aircraft)
-    verdict = judge(log, scenario, aircraft, end, touchdown)
+    verdict = judge(log, scenario, aircraft, end, touchdown, detail)
     n = log["time_s"].size
     stop = None
     if end == "stopped" and n:

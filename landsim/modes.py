@@ -48,7 +48,13 @@ def modes(plant: Plant) -> tuple[Mode, ...]:
 
     The eigenvalues are those of the eight states of speed, incidence, attitude and rate.  Position and heading hardly
     act back and are left out, and so is the propeller's speed: JSBSim's linearisation lets it reach its steady
-    state at every speed of flight.  A real longitudinal pair raises ValueError: the modes would have other names.
+    state at every speed of flight.
+
+    Raises
+    ------
+    ValueError
+        If they are not two longitudinal pairs, a lateral pair and two real lateral ones: the modes would have other
+        names.
     """
     names, matrix = plant.linearised()
     kept = [names.index(name) for name in (*LONGITUDINAL, *LATERAL)]
@@ -57,6 +63,8 @@ def modes(plant: Plant) -> tuple[Mode, ...]:
     along = np.linalg.norm(share, axis=0) > np.linalg.norm(vectors[len(LONGITUDINAL) :], axis=0)
     upper = values.imag > 0.0
     real = values.imag == 0.0
+    if (np.sum(along & upper), np.sum(~along & upper), np.sum(~along & real)) != (2, 1, 2):
+        raise ValueError(f"the eigenvalues are not those of the five usual modes: {np.round(values, 3).tolist()}")
     fast, slow = sorted(values[along & upper], key=abs, reverse=True)
     (dutch,) = values[~along & upper]
     roll, spiral = sorted(values[~along & real], key=abs, reverse=True)

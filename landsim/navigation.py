@@ -7,17 +7,12 @@ lines whenever the threshold is in view and two when it is not.
 import math
 from typing import NamedTuple
 
+from estimator.alignment import Alignment, Incidence
 from estimator.camera import PinholeCamera
-from estimator.fusion import (
-    NO_UPDATE,
-    Alignment,
-    Gates,
-    InertialVisionFilter,
-    Update,
-    body_from_camera,
-)
-from estimator.innovation import LineObservation, Lines, Mount, camera_axes, pose_innovation
+from estimator.fusion import NO_UPDATE, Gates, InertialVisionFilter, Update
+from estimator.innovation import LineObservation, Lines, pose_innovation
 from estimator.lines import fit_variances
+from estimator.mount import Mount, body_from_camera, camera_axes
 from estimator.so3 import IDENTITY, Vec3, rotate_back, to_euler
 from estimator.strapdown import ImuNoise, Inertial, Site
 from estimator.three_line import three_line_pose
@@ -26,8 +21,6 @@ from landsim.state import CameraFrame, ImuSample, LineReading, NavState, Stage
 from landsim.units import DEG
 
 NAN = math.nan
-AIRSPEED_SMOOTHING = 0.2
-"""Time constant of the low-pass on the pitot tube's noise, s."""
 
 
 def mount_of(config: MountConfig) -> Mount:
@@ -61,8 +54,8 @@ class Navigator:
     mount : Mount
         Of the camera.
     config : NavigationConfig
-    alpha : float
-        Angle of attack in trim, rad.
+    incidence : Incidence
+        In steady flight.
 
     Attributes
     ----------
@@ -84,23 +77,29 @@ class Navigator:
         imu_dt: float,
         mount: Mount,
         config: NavigationConfig,
-        alpha: float,
+        incidence: Incidence,
     ) -> None:
         self._camera = camera
-        self._noise_px = noise_px
+        self._noise_px = max(noise_px, config.min_noise_px)
         self._width = width
         self._site = site
         self._imu = imu
         self._dt = imu_dt
         self._mount = mount
         self._gates = Gates(config.gate_early, config.gate_late)
-        self._max_sigma = config.max_position_sigma_m
-        self._alignment = Alignment(site, config.start_frames, alpha, config.start_speed_sigma_mps)
-        self._smoothing = 1.0 - math.exp(-imu_dt / AIRSPEED_SMOOTHING)
+        self._config = config
+        self._incidence = incidence
+        self._alignment = self._new_alignment()
+        self._smoothing = 1.0 - math.exp(-imu_dt / config.airspeed_smoothing_s)
+        self._rejected = 0
         self.airspeed = NAN
         self._angle: Vec3 = (0.0, 0.0, 0.0)
         self.stage = Stage.NONE
         self.filter: InertialVisionFilter | None = None
+
+    def _new_alignment(self) -> Alignment:
+        config = self._config
+        return Alignment(self._site, config.start_frames, self._incidence, config.start_speed_sigma_mps)
 
     def take_airspeed(self, airspeed: float) -> None:
         """Take in a sample of the pitot tube (m/s), at the rate of the inertial unit."""
@@ -125,6 +124,8 @@ class Navigator:
         right, down, _ = camera_axes(self.filter.state.attitude, frame.tilt)
         roll = math.atan2(right[2], down[2])
         update = self.filter.observe(lines, frame.tilt)
+        if update.degrees > 0:
+            self._rejected = 0 if update.accepted else self._rejected + 1
         self.stage = Stage.NONE if not update.accepted else Stage.EARLY if update.degrees == 6 else Stage.LATE
         return FrameResult(update, self.stage, roll)
 
@@ -132,9 +133,7 @@ class Navigator:
         if reading is None:
             return None
         offset, angle = fit_variances(reading.spread, reading.points, self._noise_px)
-        return LineObservation(
-            reading.a, reading.b, reading.c, reading.centroid_u, reading.centroid_v, float(offset), float(angle)
-        )
+        return LineObservation(reading.a, reading.b, reading.c, reading.centroid_u, reading.centroid_v, offset, angle)
 
     def _align(self, lines: Lines, tilt: float) -> FrameResult:
         """One of the first frames: the filter starts when there are enough."""
@@ -156,7 +155,11 @@ class Navigator:
         if self._alignment.add(body, self.airspeed):
             state = self._alignment.mean(self.airspeed)
             pose = pose_innovation(self._camera, self._width, self._mount, lines, state.position, state.attitude, tilt)
-            if pose is not None:
+            turn_sigma = math.inf if pose is None else math.sqrt(max(pose.R[3, 3], pose.R[4, 4], pose.R[5, 5]))
+            if pose is None or turn_sigma > self._config.start_attitude_sigma_deg * DEG:
+                # so far away a mean of poses is no start: begin again, nearer
+                self._alignment = self._new_alignment()
+            else:
                 start = self._alignment.start(self.airspeed, pose, self._mount, self._imu)
                 self.filter = InertialVisionFilter(
                     self._camera, self._width, self._mount, self._site, self._imu, self._gates, start
@@ -165,13 +168,19 @@ class Navigator:
         return FrameResult(NO_UPDATE, Stage.EARLY, NAN)
 
     @property
-    def diverged(self) -> bool:
-        """The filter's covariance is not finite, or its position sigma has passed the limit."""
+    def diverged(self) -> str | None:
+        """Why the filter is no longer to be believed, if it is not."""
         if self.filter is None:
-            return False
+            return None
         p = self.filter.covariance
-        variance = float(p[0, 0]) + float(p[1, 1]) + float(p[2, 2])
-        return not variance <= self._max_sigma**2
+        sigma2 = float(p[0, 0]) + float(p[1, 1]) + float(p[2, 2])
+        if not math.isfinite(sigma2) or not math.isfinite(sum(self.filter.state.position)):
+            return "its numbers are not finite"
+        if sigma2 > self._config.max_position_sigma_m**2:
+            return f"its position sigma is {math.sqrt(sigma2):.1f} m"
+        if self._rejected > self._config.max_rejected_frames:
+            return f"it rejected {self._rejected} frames in succession"
+        return None
 
     @property
     def inertial(self) -> Inertial:

@@ -94,6 +94,10 @@ class TrimError(RuntimeError):
     """The aircraft has no steady flight at the state asked for."""
 
 
+class StepError(RuntimeError):
+    """JSBSim failed in flight."""
+
+
 class TrimPoint(NamedTuple):
     """Steady flight as JSBSim found it."""
 
@@ -261,7 +265,6 @@ class Plant:
         self._set("ic/psi-true-deg", math.atan2(east, north) / DEG % 360.0)
         self._set("ic/vt-fps", initial.speed / FT)
         self._set("ic/gamma-deg", math.atan2(-down, math.hypot(north, east)) / DEG)
-        self._set("nav/airspeed-mps", initial.speed)
         try:
             self._fdm.run_ic()
             # over raised terrain JSBSim misses the height it is given by millimetres
@@ -358,8 +361,16 @@ class Plant:
         -------
         Truth
             At its end.
+
+        Raises
+        ------
+        StepError
+            When JSBSim fails.
         """
-        self._run()
+        try:
+            self._run()
+        except jsbsim.BaseError as error:
+            raise StepError(f"JSBSim failed in flight: {error}") from error
         self._steps += 1
         return self._truth()
 

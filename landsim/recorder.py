@@ -11,7 +11,8 @@ import numpy as np
 
 from estimator.camera import PinholeCamera
 from estimator.fusion import InertialVisionFilter
-from estimator.innovation import Mount, camera_sigma
+from estimator.innovation import camera_sigma
+from estimator.mount import Mount, camera_triads
 from estimator.so3 import Array, Vec3
 from estimator.strapdown import ACCEL_BIAS, GYRO_BIAS
 from estimator.three_line import three_line_pose
@@ -30,6 +31,38 @@ class Body(NamedTuple):
     position: Array
     velocity: Array
     attitude: Array
+
+
+STEP = {
+    "time": 1, "position": 3, "velocity": 3, "attitude": 9, "airspeed": 1, "wow": 3, "surfaces": 3, "throttle": 1,
+    "ready": 1, "nav_position": 3, "nav_velocity": 3, "nav_attitude": 9, "stage": 1,
+    "engaged": 1, "command_pitch": 1, "command_roll": 1, "command_airspeed": 1, "brake": 1, "steering": 1,
+    "phase": 1, "pitot": 1, "tilt": 1, "reading": 1,
+}  # fmt: skip
+"""What `Recorder.step` takes down, in its order, and how many numbers each is."""
+FRAME = {
+    "roll": 1, "nis_dof": 1, "nis": 1, "accepted": 1,
+    "left_true": 4, "threshold_true": 4, "right_true": 4,
+    "left_line": 3, "left_ends": 4, "threshold_line": 3, "threshold_ends": 4, "right_line": 3, "right_ends": 4,
+}  # fmt: skip
+"""The same of `Recorder.frame`."""
+
+
+def _named(rows: Array, widths: dict[str, int]) -> dict[str, Array]:
+    """Rows of numbers by name: (n,) for a single one, (k, n) for k.
+
+    Raises
+    ------
+    ValueError
+        If there are not as many rows as the widths add up to.
+    """
+    if len(rows) != sum(widths.values()):
+        raise ValueError(f"{len(rows)} numbers were taken down where {sum(widths.values())} are named")
+    ends = np.cumsum(list(widths.values())).tolist()
+    return {
+        name: rows[end - 1] if width == 1 else rows[end - width : end]
+        for (name, width), end in zip(widths.items(), ends, strict=True)
+    }
 
 
 class Recorder:
@@ -103,31 +136,34 @@ class Recorder:
         log = {column.name: np.full(self._count, np.nan) for column in COLUMNS}
         if self._count == 0:
             return log
-        columns = np.fromiter(self._steps, float, len(self._steps)).reshape(self._count, -1).T.copy()
-        true = Body(columns[1:4].T, columns[4:7].T, columns[7:16].T.reshape(-1, 3, 3))
-        ready = columns[24] > 0.0
-        columns[25:40, ~ready] = np.nan
-        fused = Body(columns[25:28].T, columns[28:31].T, columns[31:40].T.reshape(-1, 3, 3))
-        tilt, reading = columns[49], columns[50]
+        flat = np.fromiter(self._steps, float, len(self._steps)).reshape(self._count, -1).T.copy()
+        step = _named(flat, STEP)
+        ready = step["ready"] > 0.0
+        for name in ("nav_position", "nav_velocity", "nav_attitude"):
+            step[name][:, ~ready] = np.nan
+        true = Body(step["position"].T, step["velocity"].T, step["attitude"].T.reshape(-1, 3, 3))
+        fused = Body(step["nav_position"].T, step["nav_velocity"].T, step["nav_attitude"].T.reshape(-1, 3, 3))
+        tilt, reading = step["tilt"], step["reading"]
 
-        log["time_s"], log["phase"], log["stage"] = columns[0], columns[47], columns[40]
+        log["time_s"], log["phase"], log["stage"] = step["time"], step["phase"], step["stage"]
         _pose(log, "true", true, self._mount.lever, tilt)
         _pose(log, "fused", fused, self._mount.lever, reading)
-        log["body_x_m"], log["body_y_m"], log["body_height_m"] = columns[1], columns[2], -columns[3]
-        log["wheel_height_m"] = -columns[3] - true.attitude[:, 2, :] @ np.array(self._wheels)
+        x, y, z = step["position"]
+        log["body_x_m"], log["body_y_m"], log["body_height_m"] = x, y, -z
+        log["wheel_height_m"] = -z - true.attitude[:, 2, :] @ np.array(self._wheels)
         log["body_roll_deg"], log["body_pitch_deg"], log["body_yaw_deg"] = euler_deg(true.attitude)
         for i, axis in enumerate(AXES):
-            log[f"true_velocity_{axis}_mps"] = columns[4 + i]
-            log[f"fused_velocity_{axis}_mps"] = columns[28 + i]
-        log["true_airspeed_mps"], log["pitot_airspeed_mps"] = columns[16], columns[48]
-        log["wow_nose"], log["wow_left"], log["wow_right"] = columns[17:20]
-        log["elevator_deg"], log["aileron_deg"], log["rudder_deg"] = columns[20:23] / DEG
-        log["throttle"], log["brake"], log["steering"] = columns[23], columns[45], columns[46]
-        log["tilt_deg"] = tilt / DEG
-        engaged = columns[41] > 0.0
-        log["command_pitch_deg"] = np.where(engaged, columns[42] / DEG, np.nan)
-        log["command_roll_deg"] = np.where(engaged, columns[43] / DEG, np.nan)
-        log["command_airspeed_mps"] = np.where(engaged, columns[44], np.nan)
+            log[f"true_velocity_{axis}_mps"] = step["velocity"][i]
+            log[f"fused_velocity_{axis}_mps"] = step["nav_velocity"][i]
+        log["true_airspeed_mps"], log["pitot_airspeed_mps"] = step["airspeed"], step["pitot"]
+        log["wow_nose"], log["wow_left"], log["wow_right"] = step["wow"]
+        log["elevator_deg"], log["aileron_deg"], log["rudder_deg"] = step["surfaces"] / DEG
+        log["throttle"], log["brake"], log["steering"] = step["throttle"], step["brake"], step["steering"]
+        log["tilt_deg"], log["tilt_reading_deg"] = tilt / DEG, reading / DEG
+        engaged = step["engaged"] > 0.0
+        log["command_pitch_deg"] = np.where(engaged, step["command_pitch"] / DEG, np.nan)
+        log["command_roll_deg"] = np.where(engaged, step["command_roll"] / DEG, np.nan)
+        log["command_airspeed_mps"] = np.where(engaged, step["command_airspeed"], np.nan)
         self._frame_columns(log)
         self._filter_columns(log, true, fused, reading)
         return log
@@ -137,18 +173,17 @@ class Recorder:
         if not self._frame_rows:
             return
         at = np.array(self._frame_rows)
-        values = np.fromiter(self._frames, float, len(self._frames)).reshape(at.size, -1).T
-        measured = values[1] > 0.0
-        values[1:4, ~measured] = np.nan
-        names = ["nis_dof", "nis", "accepted"]
-        names += [f"{line}_true_{end}" for line in LINES for end in ENDS]
-        for name, column in zip(names, values[1:16], strict=True):
-            log[name][at] = column
-        lines = values[16:].reshape(3, 7, at.size)
-        for line, ends in zip(LINES, lines[:, 3:], strict=True):
-            for end, column in zip(ENDS, ends, strict=True):
-                log[f"{line}_seen_{end}"][at] = column
-        for quantity, column in zip(QUANTITIES, self._vision(lines[:, :3], values[0]), strict=True):
+        flat = np.fromiter(self._frames, float, len(self._frames)).reshape(at.size, -1).T
+        frame = _named(flat, FRAME)
+        measured = frame["nis_dof"] > 0.0
+        for name in ("nis_dof", "nis", "accepted"):
+            log[name][at[measured]] = frame[name][measured]
+        for line in LINES:
+            for k, end in enumerate(ENDS):
+                log[f"{line}_true_{end}"][at] = frame[f"{line}_true"][k]
+                log[f"{line}_seen_{end}"][at] = frame[f"{line}_ends"][k]
+        lines = np.stack([frame[f"{line}_line"] for line in LINES])
+        for quantity, column in zip(QUANTITIES, self._vision(lines, frame["roll"]), strict=True):
             log[f"vision_{quantity}"][at] = column
 
     def _vision(self, lines: Array, roll: Array) -> Array:
@@ -222,9 +257,7 @@ def euler_deg(attitude: Array) -> tuple[Array, Array, Array]:
 
 def _pose(log: dict[str, Array], source: str, body: Body, lever: Vec3, tilt: Array) -> None:
     camera = body.position + body.attitude @ np.array(lever)
-    s, c = np.sin(tilt)[:, None], np.cos(tilt)[:, None]
-    forward, right, down = body.attitude[:, :, 0], body.attitude[:, :, 1], body.attitude[:, :, 2]
-    triad = np.stack((c * forward + s * down, right, c * down - s * forward), axis=-1)
+    triad = camera_triads(body.attitude, tilt)
     values = (camera[:, 0], camera[:, 1], -camera[:, 2], *euler_deg(triad))
     for quantity, value in zip(QUANTITIES, values, strict=True):
         log[f"{source}_{quantity}"] = value

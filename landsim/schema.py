@@ -155,19 +155,28 @@ class NavigationConfig(Section):
     start_frames: Annotated[int, Field(ge=2, le=1000)] = 15
     """Camera frames from which the first state is made."""
     start_speed_sigma_mps: Positive = 0.5
+    """Of the first velocity, on each axis: the wind, the pitot tube and the sideslip are in it."""
     gate_early: Positive = 22.5
     """Greatest normalised innovation squared of three lines, six numbers."""
     gate_late: Positive = 18.5
     """The same of two lines, four numbers."""
+    start_attitude_sigma_deg: Positive = 5.0
+    """The filter waits while one frame's attitude is known no better than this: a mean of such poses is no start."""
+    min_noise_px: Positive = 0.05
+    """The filter believes no line's points better than this: beyond it, the curvature of the projection counts."""
+    airspeed_smoothing_s: Positive = 0.2
+    """Time constant of the low-pass on the pitot tube's noise."""
     max_position_sigma_m: Positive = 500.0
     """Diverged when the filter's own σ of the position passes this."""
+    max_rejected_frames: Annotated[int, Field(ge=1)] = 300
+    """Diverged when more frames than this in succession do not pass the gate."""
 
 
 class SimulationConfig(Section):
     """``[simulation]``: the plant's step and the longest flight."""
 
     rate_hz: Annotated[float, Field(ge=20.0, le=10000.0)] = 120.0
-    """``imu.rate_hz`` and ``camera.rate_hz`` must divide it."""
+    """``imu.rate_hz`` must divide it, and ``camera.rate_hz`` must divide both."""
     time_limit_s: Annotated[float, Field(gt=0.0, le=36000.0)] = 120.0
 
 
@@ -212,6 +221,11 @@ class ScenarioFile(Section):
             steps = step_rate / rate
             if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
                 raise _refused(f"must divide simulation.rate_hz = {step_rate:g}; {rate:g} does not", key)
+        frames = self.imu.rate_hz / self.camera.rate_hz
+        if round(frames) < 1 or abs(frames - round(frames)) > 1e-9 * frames:
+            raise _refused(
+                f"must divide imu.rate_hz = {self.imu.rate_hz:g}; {self.camera.rate_hz:g} does not", "camera.rate_hz"
+            )
         if self.approach.aim_point_m >= self.runway.length_m:
             length, aim_point = self.runway.length_m, self.approach.aim_point_m
             raise _refused(f"must be below runway.length_m = {length:g}, not {aim_point:g}", "approach.aim_point_m")
@@ -224,9 +238,14 @@ class MountConfig(Section):
     position_body_m: PointM
     """Projection centre from the centre of gravity: forward, right, down."""
     tilt_early_deg: Annotated[float, Field(ge=-45.0, le=45.0)] = 3.0
+    """While the threshold is in view."""
     tilt_late_deg: Annotated[float, Field(ge=-45.0, le=45.0)] = 10.0
+    """From when the threshold leaves the image to the touchdown."""
+    tilt_rollout_deg: Annotated[float, Field(ge=-45.0, le=45.0)] = 3.0
+    """On the ground, where the late tilt and the nose going down under braking would lose the edges."""
     tilt_rate_deg_s: Positive = 10.0
     tilt_reading_sigma_deg: NotNegative = 0.005
+    """1 σ of each reading of the angle, white."""
 
 
 class GearConfig(Section):
@@ -237,6 +256,12 @@ class GearConfig(Section):
     right_wheel_body_m: PointM
     sink_limit_mps: Positive = 3.0
     """Touchdown beyond it is a crash."""
+
+    @property
+    def main_wheels_body_m(self) -> tuple[float, float, float]:
+        """Midpoint of the main wheels, from the centre of gravity."""
+        a, b, c = (0.5 * (x + y) for x, y in zip(self.left_wheel_body_m, self.right_wheel_body_m, strict=True))
+        return a, b, c
 
 
 class SpeedsConfig(Section):
@@ -256,6 +281,8 @@ class ApproachGains(Section):
     """Sink rate asked for, per metre above the slope."""
     pitch_gain_rad_per_mps: NotNegative
     pitch_integral_rad_per_m: NotNegative
+    pitch_integral_max_deg: Positive = 3.0
+    """Most that the integral may ask for."""
     max_sink_mps: Positive
     lateral_gain_per_s: NotNegative
     """Lateral speed asked for, per metre off the centreline."""
@@ -272,6 +299,7 @@ class FlareGains(Section):
     """Wheel height at which the flare begins."""
     time_constant_s: Positive
     height_bias_m: NotNegative
+    """So that some sink rate is left when the wheels meet the ground."""
     touchdown_height_m: Positive = 0.05
     """Wheel height, by navigation, below which the wheels are taken to be on the ground."""
 

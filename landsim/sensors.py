@@ -12,8 +12,8 @@ import numpy as np
 from numpy.random import Generator
 
 from estimator.camera import PinholeCamera
-from estimator.innovation import camera_axes, camera_position
 from estimator.lines import line_from_moments
+from estimator.mount import camera_axes, camera_position
 from estimator.so3 import Array, Vec3
 from estimator.strapdown import ImuNoise, Site, increments
 from landsim.config import CameraConfig, ImuConfig, MountConfig, PitotConfig
@@ -145,6 +145,8 @@ class Imu:
 class Pitot:
     """The airspeed: a first-order lag, and white noise on each sample.
 
+    It gives true airspeed: that the density is known on board is an idealisation.
+
     Parameters
     ----------
     config : PitotConfig
@@ -261,9 +263,9 @@ class LineCamera:
 
     def _seen(self, start: Vec3, end: Vec3) -> PixelSegment | None:
         seen = self.camera.clip(start, end, self._config.near_m)
-        if seen is None or math.hypot(seen[2] - seen[0], seen[3] - seen[1]) < self._config.min_line_px:
-            return None
-        return seen
+        if seen is not None and math.hypot(seen[2] - seen[0], seen[3] - seen[1]) >= self._config.min_line_px:
+            return seen
+        return None
 
     def _read(self, ends: Sequence[PixelSegment | None]) -> list[LineReading | None]:
         """Lines fitted to noisy points: both ends of each, or points evenly spread between them."""

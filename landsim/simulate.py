@@ -1,4 +1,4 @@
-"""The loop of one flight, and the only place that holds both the truth and the navigation state.
+"""The loop of one flight; beside its recorder the only place that holds both the truth and the navigation state.
 
 One step of the plant: the sensors measure its state, navigation takes the measurements in, guidance makes a command
 from the navigation state, and the plant's own inner loops fly it until the next step.
@@ -10,16 +10,17 @@ import platform
 import time
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from numpy.random import Generator, SeedSequence, default_rng
 
+from estimator.alignment import Incidence
 from estimator.so3 import Array
-from landsim.config import Scenario
+from landsim.config import AircraftConfig, Scenario
 from landsim.guidance import INITIAL, guide, law_of
 from landsim.metrics import flight_metrics
 from landsim.navigation import Navigator, mount_of
-from landsim.plant import Plant, TrimError
+from landsim.plant import Plant, StepError, TrimError
 from landsim.recorder import Recorder
 from landsim.runway import Runway
 from landsim.sensors import Imu, LineCamera, Pitot, TiltMount, camera_of, imu_noise, site_of
@@ -63,6 +64,12 @@ def runway_of(scenario: Scenario) -> Runway:
     )
 
 
+def incidence_of(aircraft: AircraftConfig) -> Incidence:
+    """The angle of attack of an aircraft in steady flight."""
+    gains = aircraft.guidance.approach
+    return Incidence(gains.trim_alpha_deg * DEG, gains.trim_alpha_slope_deg_per_mps * DEG, aircraft.speeds.approach_mps)
+
+
 def draw_start(scenario: Scenario, rng: Generator) -> InitialState:
     """The start of one flight: the scenario's, with what the seed adds to it."""
     s = scenario.start
@@ -99,18 +106,35 @@ def fly(scenario: Scenario, seed: int = 0) -> Flight:
         raise ValueError(f"{scenario.name}: a scenario of the kind {scenario.kind!r} is not flown")
     began = time.perf_counter()
     aircraft = scenario.aircraft_config
-    left, right = aircraft.gear.left_wheel_body_m, aircraft.gear.right_wheel_body_m
-    wheels = (0.5 * (left[0] + right[0]), 0.5 * (left[1] + right[1]), 0.5 * (left[2] + right[2]))
-    recorder = Recorder(camera_of(scenario.camera), scenario.runway.width_m, mount_of(aircraft.mount), wheels)
-    end = _fly(scenario, seed, recorder)
+    recorder = Recorder(
+        camera_of(scenario.camera), scenario.runway.width_m, mount_of(aircraft.mount), aircraft.gear.main_wheels_body_m
+    )
+    try:
+        end = _fly(scenario, seed, recorder)
+    except (StepError, ArithmeticError, ValueError) as error:  # LinAlgError is a ValueError
+        end = End("error", f"{type(error).__name__}: {error}")
     log = recorder.table()
     metrics = flight_metrics(
-        log, scenario, aircraft, seed=seed, end=end, wall_time_s=time.perf_counter() - began, versions=_versions()
+        log,
+        scenario,
+        aircraft,
+        seed=seed,
+        end=end.kind,
+        detail=end.detail,
+        wall_time_s=time.perf_counter() - began,
+        versions=_versions(),
     )
     return Flight(metrics, log)
 
 
-def _fly(scenario: Scenario, seed: int, recorder: Recorder) -> str:
+class End(NamedTuple):
+    """Why a flight was over: one of `landsim.metrics.ENDS`, and what there is to say of it."""
+
+    kind: str
+    detail: str = ""
+
+
+def _fly(scenario: Scenario, seed: int, recorder: Recorder) -> End:
     """The loop; says why it ended."""
     aircraft, settings = scenario.aircraft_config, scenario.simulation
     dt = 1.0 / settings.rate_hz
@@ -125,8 +149,8 @@ def _fly(scenario: Scenario, seed: int, recorder: Recorder) -> str:
     plant = Plant(aircraft.folder, aircraft.model, runway, settings.rate_hz)
     try:
         truth = plant.start(draw_start(scenario, start_rng))
-    except TrimError:
-        return "trim_failed"
+    except TrimError as error:
+        return End("trim_failed", str(error))
 
     imu = Imu(scenario.imu, site, truth, imu_rng)
     pitot = Pitot(scenario.pitot, dt, truth, limit, pitot_rng)
@@ -141,7 +165,7 @@ def _fly(scenario: Scenario, seed: int, recorder: Recorder) -> str:
         imu_dt,
         mount_of(aircraft.mount),
         scenario.navigation,
-        aircraft.guidance.approach.trim_alpha_deg * DEG,
+        incidence_of(aircraft),
     )
     half_view = math.atan((camera.camera.height - 0.5 - camera.camera.cy) / camera.camera.fy)
     law = law_of(aircraft, scenario.approach, site.gravity, half_view, frame_every * dt)
@@ -151,7 +175,7 @@ def _fly(scenario: Scenario, seed: int, recorder: Recorder) -> str:
 
     rate, side_force = _ZERO, 0.0
     standing = 0.0
-    end: str | None = None
+    diverged: str | None = None
     for step in range(limit):
         airspeed = pitot.sample(truth)
         if step % imu_every == 0:
@@ -166,22 +190,22 @@ def _fly(scenario: Scenario, seed: int, recorder: Recorder) -> str:
             view = camera.view(truth, mount.tilt, tilt_reading)
             result = navigator.observe(view.frame)
             recorder.frame(view, result, navigator.filter, imu)
-            if navigator.diverged:
-                end = "diverged"
+            diverged = navigator.diverged
             command, guidance = guide(law, navigator.state(truth.time), guidance)
             plant.command(command)
         recorder.step(truth, navigator, command, guidance.phase, airspeed, mount.tilt, tilt_reading)
-        end = end or _over(truth)
-        if end is not None:
-            return end
-        standing = standing + dt if truth.wow_left and stands(truth) else 0.0
+        if diverged is not None:
+            return End("diverged", diverged)
+        standing = standing + dt if stands(truth) else 0.0
         if standing > STANDSTILL_TIME:
-            return "stopped"
+            return End("stopped")
         mount.move(command.tilt)
         roll, pitch = navigator.roll_and_pitch()
         plant.feed(rate, side_force, roll, pitch, navigator.airspeed)
         truth = plant.step()
-    return "timeout"
+        if truth.structure_contact or not -truth.position[2] > BELOW_GROUND:  # the latter catches NaN
+            return _crash(recorder, truth, navigator, command, guidance.phase, airspeed, mount.tilt, tilt_reading)
+    return End("timeout")
 
 
 _ZERO = (0.0, 0.0, 0.0)
@@ -192,13 +216,12 @@ def stands(truth: Truth) -> bool:
     return truth.wow_left and truth.wow_right and math.hypot(truth.velocity[0], truth.velocity[1]) < STANDSTILL
 
 
-def _over(truth: Truth) -> str | None:
-    """Why the flight is over, if it is."""
-    if truth.structure_contact:
-        return "structure_contact"
-    if not -truth.position[2] > BELOW_GROUND:  # catches NaN
-        return "below_ground" if math.isfinite(truth.position[2]) else "error"
-    return None
+def _crash(recorder: Recorder, truth: Truth, *known: Any) -> End:
+    """Why the flight is over with this state, which no sensor has to see any more."""
+    if not all(map(math.isfinite, (*truth.position, *truth.velocity, *truth.R_runway_from_body))):
+        return End("error", "JSBSim's state is not finite")
+    recorder.step(truth, *known)
+    return End("structure_contact" if truth.structure_contact else "below_ground")
 
 
 @cache

@@ -67,7 +67,7 @@ class CameraFrame(NamedTuple):
 
 
 class NavState(NamedTuple):
-    """What navigation gives to guidance and to the inner loops."""
+    """What navigation gives to guidance."""
 
     time: float
     ready: bool

@@ -1,4 +1,4 @@
-"""What is true.  The plant makes it; sensors, the simulation loop and the metrics may hold it, nobody else.
+"""What is true.  The plant makes it; the sensors, the simulation loop and its recorder may hold it, nobody else.
 
 Named tuples and not dataclasses: one is made at every step, and a frozen dataclass costs five times as much.
 """

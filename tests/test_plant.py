@@ -6,9 +6,10 @@ from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from estimator.so3 import cross, from_euler, matmul, rotate, rotate_back, to_euler
+from estimator.so3 import from_euler, matmul, rotate, rotate_back, to_euler
 from landsim import earth
 from landsim.errors import InputError
 from landsim.plant import Plant, PlantError, TrimError, load, node
@@ -153,7 +154,7 @@ def test_specific_force_by_velocity_is_jsbsim_s_accelerometer(runway: Runway) ->
         after = plant.step()
         down = rotate(runway.R_runway_from_ned_at(latitude, longitude), (0.0, 0.0, 1.0))
         gravity = earth.gravity(latitude, height)
-        turn = cross(runway.earth_rate, now.velocity)
+        turn = np.cross(runway.earth_rate, now.velocity)
         gain = [0.5 * RATE * (b - a) for a, b in zip(before.velocity, after.velocity, strict=True)]
         x, y, z = (g + 2.0 * t - gravity * d for g, t, d in zip(gain, turn, down, strict=True))
         force = rotate_back(now.R_runway_from_body, (x, y, z))

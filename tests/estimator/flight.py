@@ -15,7 +15,8 @@ from outside import DEG, LENGTH, PAPER, WIDTH, Poses, runway_lines, visible
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from estimator.innovation import LineObservation, Lines, Mount
+from estimator.innovation import LineObservation, Lines
+from estimator.mount import Mount
 from estimator.so3 import Array, Vec3
 from estimator.strapdown import ImuNoise, Site
 

@@ -20,15 +20,10 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from estimator import three_line_pose
-from estimator.fusion import (
-    NO_UPDATE,
-    Alignment,
-    Gates,
-    InertialVisionFilter,
-    Start,
-    body_from_camera,
-)
-from estimator.innovation import LineObservation, Lines, Mount, pose_innovation
+from estimator.alignment import Alignment, Incidence, Start
+from estimator.fusion import NO_UPDATE, Gates, InertialVisionFilter
+from estimator.innovation import LineObservation, Lines, pose_innovation
+from estimator.mount import Mount, body_from_camera
 from estimator.so3 import Array, flat
 from estimator.strapdown import ACCEL_BIAS, GYRO_BIAS, Inertial, corrected
 
@@ -257,7 +252,7 @@ def sightings(seed: int, frames: int) -> tuple[Alignment, Start, flight.Readings
     """The alignment and its start, from the first frames of a draw."""
     sensed = flight.readings(default_rng(seed))
     airspeed = float(np.linalg.norm(flight.truth().velocity[0]))
-    alignment = Alignment(flight.SITE, frames, 0.0, 3.0)
+    alignment = Alignment(flight.SITE, frames, Incidence(0.0, 0.0, 40.0), 3.0)
     enough = False
     for step in sensed.steps():
         alignment.propagate(step.angle, step.push, flight.DT)
@@ -287,7 +282,7 @@ def test_body_from_camera_is_the_inverse_of_the_mount() -> None:
 
 def test_velocity_at_the_start_is_along_the_nose() -> None:
     # 40 m/s, nose 5° up, 3° of angle of attack: climbing at 2°, 40 sin 2° = 1.396 m/s
-    alignment = Alignment(flight.SITE, 1, 3.0 * DEG, 1.0)
+    alignment = Alignment(flight.SITE, 1, Incidence(3.0 * DEG, 0.0, 40.0), 1.0)
     attitude = flat(Rotation.from_euler("ZYX", (0.0, 5.0 * DEG, 0.0)).as_matrix())
     pose = flight.camera_pose(np.array((-800.0, 0.0, -50.0)), np.reshape(attitude, (3, 3)), 0.1)
     assert alignment.add(body_from_camera(pose.position.tolist(), pose.R, 0.1, flight.LEVER), 40.0)
@@ -314,7 +309,7 @@ def test_covariance_at_the_start_by_sampling() -> None:
     ]
     errors = []
     for _ in range(draws):
-        alignment = Alignment(flight.SITE, frames, 0.0, speed_sigma)
+        alignment = Alignment(flight.SITE, frames, Incidence(0.0, 0.0, 40.0), speed_sigma)
         for _ in range(frames):
             seen = Lines(*(flight.measured(rng, line) for line in clean))
             reading = tilt + scale * 0.003 * rng.standard_normal()

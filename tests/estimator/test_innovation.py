@@ -21,13 +21,11 @@ from estimator.innovation import (
     Innovation,
     LineObservation,
     Lines,
-    Mount,
-    camera_axes,
     camera_from_state,
-    camera_position,
     camera_sigma,
     pose_innovation,
 )
+from estimator.mount import Mount, camera_axes, camera_position
 from estimator.so3 import Array, Vec3, flat
 
 LEVER = (1.2, 0.1, 0.3)

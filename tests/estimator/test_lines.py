@@ -4,11 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
 from hypothesis import strategies as st
 from numpy.random import default_rng
 
-from estimator.lines import fit_line, fit_variances, line_from_moments, line_through
+from estimator.lines import fit_line, fit_variances, line_from_moments
 from estimator.so3 import Array
 
 ANGLES_DEG = (-90.0, -60.0, -45.0, -1.0, 0.0, 20.0, 45.0, 89.0, 135.0)
@@ -99,17 +98,6 @@ def test_moments_of_floats_and_arrays_agree() -> None:
     many = line_from_moments(u, v, suu, suv, svv, np)
     for single, array in zip(one, many, strict=True):
         assert array == pytest.approx(np.full(3, single), rel=1e-14)
-
-
-@given(pixel, pixel, pixel, pixel)
-def test_line_through_two_pixels(u0: float, v0: float, u1: float, v1: float) -> None:
-    a, b, c = line_through(u0, v0, u1, v1)
-    if (u0, v0) == (u1, v1):
-        assert math.isnan(a + b + c)
-    elif math.hypot(u1 - u0, v1 - v0) > 1e-3:
-        assert a * a + b * b == pytest.approx(1.0)
-        assert a * u0 + b * v0 + c == pytest.approx(0.0, abs=1e-9)
-        assert a * u1 + b * v1 + c == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("shape", [(2,), (1, 2), (5, 3), (0, 2), (4, 1, 2)])

@@ -11,7 +11,7 @@ from outside import PAPER
 from scipy.spatial.transform import Rotation
 
 from estimator import so3
-from estimator.innovation import camera_axes
+from estimator.mount import camera_axes
 from estimator.so3 import Mat3, Vec3
 
 component = st.floats(-2.0, 2.0)
@@ -24,14 +24,12 @@ def matrix(rotation: Rotation) -> Mat3:
 
 def test_products_are_numpys() -> None:
     rng = default_rng(1)
-    a, b, v, w = rng.normal(size=(3, 3)), rng.normal(size=(3, 3)), rng.normal(size=3), rng.normal(size=3)
+    a, b, v = rng.normal(size=(3, 3)), rng.normal(size=(3, 3)), rng.normal(size=3)
     fa, fb, fv = so3.flat(a), so3.flat(b), (float(v[0]), float(v[1]), float(v[2]))
-    assert so3.array3(fa).tolist() == a.tolist()
     assert so3.matmul(fa, fb) == pytest.approx((a @ b).ravel())
     assert so3.transpose(fa) == tuple(a.T.ravel())
     assert so3.rotate(fa, fv) == pytest.approx(a @ v)
     assert so3.rotate_back(fa, fv) == pytest.approx(a.T @ v)
-    assert so3.cross(fv, (float(w[0]), float(w[1]), float(w[2]))) == pytest.approx(np.cross(v, w))
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-8, 9.9e-5, 1.01e-4, 1e-3, 0.3, 1.5, 3.0, 3.1415])

@@ -1,0 +1,126 @@
+"""The start of the filter: from the first vision poses and the inertial unit to a state and its covariance."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from estimator import strapdown
+from estimator.innovation import Innovation
+from estimator.mount import BodyPose, Mount
+from estimator.so3 import Array, Mat3, Vec3, log, matmul, rotate, transpose
+from estimator.strapdown import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY, ImuNoise, Inertial, Site
+
+
+class Incidence(NamedTuple):
+    """The angle of attack of steady flight."""
+
+    alpha: float
+    """At `speed`, rad."""
+    slope: float
+    """rad per m/s."""
+    speed: float
+    """Airspeed, m/s."""
+
+    def at(self, airspeed: float) -> float:
+        """Angle of attack (rad) at an airspeed (m/s)."""
+        return self.alpha + self.slope * (airspeed - self.speed)
+
+
+class Start(NamedTuple):
+    """Nominal state and covariance with which the filter starts."""
+
+    state: Inertial
+    covariance: Array
+    """(15, 15)."""
+
+
+class Alignment:
+    """The start: the first vision poses, brought to one time by the inertial unit, and a velocity along the nose.
+
+    The first pose starts a dead reckoning; the mean difference of all poses from it corrects it.  The velocity is the
+    airspeed along the body's x axis, turned down by the angle of attack: its error is that of the attitude, and the
+    wind.
+
+    Parameters
+    ----------
+    frames : int
+        Number of poses.
+    incidence : Incidence
+        By the airspeed.
+    speed_sigma : float
+        Of what the air, the tube and the sideslip leave unknown of the velocity, on each axis, m/s.
+    """
+
+    def __init__(self, site: Site, frames: int, incidence: Incidence, speed_sigma: float) -> None:
+        self._site = site
+        self._frames = frames
+        self._incidence = incidence
+        self._speed_sigma = speed_sigma
+        self._state: Inertial | None = None
+        self._time = 0.0
+        self._shifts: list[tuple[float, ...]] = []
+
+    def propagate(self, angle: Vec3, velocity: Vec3, dt: float) -> None:
+        """Carry the dead reckoning on by an interval of the inertial unit."""
+        if self._state is not None:
+            self._state, _ = strapdown.propagate(self._state, self._site, angle, velocity, dt)
+            self._time += dt
+
+    def add(self, pose: BodyPose, airspeed: float) -> bool:
+        """Take in a vision pose; True once there are enough."""
+        if self._state is None:
+            self._state = Inertial(pose.position, self._velocity(pose.attitude, airspeed), pose.attitude)
+        p, q = pose.position, self._state.position
+        turn = log(matmul(pose.attitude, transpose(self._state.attitude)))
+        self._shifts.append((p[0] - q[0], p[1] - q[1], p[2] - q[2], *turn))
+        return len(self._shifts) >= self._frames
+
+    def _velocity(self, attitude: Mat3, airspeed: float) -> Vec3:
+        alpha = self._incidence.at(airspeed)
+        return rotate(attitude, (airspeed * math.cos(alpha), 0.0, airspeed * math.sin(alpha)))
+
+    def mean(self, airspeed: float) -> Inertial:
+        """The dead-reckoned state, corrected by the mean of the poses."""
+        assert self._state is not None
+        shift = np.zeros(strapdown.STATES)
+        mean = np.mean(self._shifts, axis=0)
+        shift[POSITION], shift[ATTITUDE] = mean[:3], mean[3:]
+        position, _, attitude = strapdown.corrected(self._state, shift.tolist())
+        return Inertial(position, self._velocity(attitude, airspeed), attitude)
+
+    def start(self, airspeed: float, pose: Innovation, mount: Mount, noise: ImuNoise) -> Start:
+        """Nominal state and covariance.
+
+        Parameters
+        ----------
+        airspeed : float
+            m/s.
+        pose : Innovation
+            Early innovation of the last frame at `mean`, for its covariance: that of one frame.
+        mount : Mount
+        noise : ImuNoise
+        """
+        state = self.mean(airspeed)
+        # independent: the mean pose of the camera (6), the velocity's own error (3), the biases (6)
+        camera = pose.R / len(self._shifts)
+        camera[:3, :3] += np.eye(3) * (0.5 * self._speed_sigma * self._time) ** 2
+        camera[3:, 3:] += np.eye(3) * (noise.gyro**2 * self._time + (noise.gyro_bias * self._time) ** 2)
+        source = np.zeros((strapdown.STATES, strapdown.STATES))
+        source[:6, :6] = camera
+        source[6:9, 6:9] = np.eye(3) * self._speed_sigma**2
+        source[9:12, 9:12] = np.eye(3) * noise.gyro_bias**2
+        source[12:, 12:] = np.eye(3) * noise.accel_bias**2
+        spread = np.zeros_like(source)
+        spread[POSITION, :3] = np.eye(3)
+        spread[POSITION, 3:6] = _cross(rotate(state.attitude, mount.lever))
+        spread[ATTITUDE, 3:6] = np.eye(3)
+        spread[VELOCITY, 3:6] = -_cross(state.velocity)
+        spread[VELOCITY, 6:9] = np.eye(3)
+        spread[GYRO_BIAS, 9:12] = np.eye(3)
+        spread[ACCEL_BIAS, 12:] = np.eye(3)
+        return Start(state, spread @ source @ spread.T)
+
+
+def _cross(v: Vec3) -> Array:
+    return np.array(((0.0, -v[2], v[1]), (v[2], 0.0, -v[0]), (-v[1], v[0], 0.0)))
