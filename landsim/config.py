@@ -4,14 +4,14 @@
 """
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from landsim.errors import ScenarioError, did_you_mean, what_is_wrong
+from landsim.errors import ScenarioError, did_you_mean, is_text, what_is_wrong
 from landsim.resources import AIRCRAFT_FILE, find_aircraft, find_scenario
 from landsim.schema import (
     AircraftChoice,
@@ -92,7 +92,15 @@ def load_scenario(name_or_path: str | Path, overrides: Mapping[str, object] | No
     ScenarioError
         One line: file, dotted key, what is wrong, and the nearest right name.
     """
-    path = find_scenario(name_or_path)
+    if not str(name_or_path).strip():
+        raise ScenarioError("no scenario named: give a shipped name (see: landsim list) or the path of a TOML file")
+    try:
+        path = find_scenario(name_or_path)
+    except (OSError, RuntimeError) as error:  # a name too long, no such user's home
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise ScenarioError(f"{name_or_path}: cannot be read: {reason}") from None
+    if not is_text(str(path)):
+        raise ScenarioError(f"{path}: the path of a scenario must be UTF-8 text")
     overrides = dict(overrides or {})
     table = _read(path)
     for key, value in overrides.items():
@@ -100,6 +108,8 @@ def load_scenario(name_or_path: str | Path, overrides: Mapping[str, object] | No
     settings = _validated(ScenarioFile, table, path, overrides)
     base = Path() if "aircraft.name" in overrides or "aircraft" in overrides else path.parent
     name, folder = _named(path, overrides, settings.aircraft.name, base)
+    if not is_text(name):
+        raise ScenarioError(f"{_where('aircraft.name', path, overrides)}: must be UTF-8 text, not {name}")
     sections = {key: getattr(settings, key) for key in ScenarioFile.model_fields}
     return Scenario(
         **{**sections, "aircraft": AircraftChoice(name=name)},
@@ -147,8 +157,12 @@ def parse_setting(text: str) -> tuple[str, object]:
         If there is no ``=``, no key or no value.
     """
     key, equals, value = (part.strip() for part in text.partition("="))
+    if not is_text(text):
+        raise ScenarioError(f'setting "{text}": must be UTF-8 text')
     if not (equals and key and value):
         raise ScenarioError(f'setting "{text}": must be dotted.key=value')
+    if not _is_dotted(key):
+        raise ScenarioError(f'setting "{text}": the key has an empty part; must be as in runway.width_m=45.0')
     try:
         table = tomllib.loads(f"value = {value}")
     except tomllib.TOMLDecodeError:
@@ -191,8 +205,14 @@ def _read(path: Path) -> dict[str, Any]:
         raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from None
 
 
+def _is_dotted(key: object) -> bool:
+    return isinstance(key, str) and is_text(key) and all(part.strip() for part in key.split("."))
+
+
 def _override(table: dict[str, Any], key: str, value: object, path: Path) -> None:
     """Set one dotted key of the tables."""
+    if not _is_dotted(key):
+        raise ScenarioError(f"{path}: override {key!r}: must be a dotted key, such as runway.width_m")
     *tables, last = key.split(".")
     for done, name in enumerate(tables, 1):
         table = table.setdefault(name, {})
@@ -216,8 +236,7 @@ def _validated(
         place += tuple(key.split("."))
     dotted = ".".join(str(name) for name in place)
     if error["type"] == "extra_forbidden":
-        prefix = "".join(f"{name}." for name in place[:-1])
-        what = f"unknown key{did_you_mean(str(place[-1]), field_names(model, place[:-1]), prefix)}"
+        what = f"unknown key{_meant(model, place)}"
     elif error["type"] == "missing" and isinstance(place[-1], int):
         dotted = ".".join(str(name) for name in place[:-1])
         what = f"element {place[-1] + 1} is missing"
@@ -225,6 +244,26 @@ def _validated(
         what = what_is_wrong(dict(error))
     others = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
     raise ScenarioError(f"{_where(dotted, path, overrides or {})}: {what}{others}")
+
+
+def _meant(model: type[Section], place: tuple[int | str, ...]) -> str:
+    """The end of a message about an unknown key: where a key of that very name is, or the nearest one in its table."""
+    name = str(place[-1])
+    elsewhere = [key for key in _keys(model) if key.rpartition(".")[2] == name]
+    if elsewhere:
+        *first, last = elsewhere
+        return f"; did you mean {', '.join(first)}{' or ' if first else ''}{last}?"
+    return did_you_mean(name, field_names(model, place[:-1]), "".join(f"{name}." for name in place[:-1]))
+
+
+def _keys(model: type[Section], place: tuple[str, ...] = ()) -> Iterator[str]:
+    """Every dotted key of a model, tables themselves left out."""
+    for name in field_names(model, place):
+        below = (*place, name)
+        if field_names(model, below):
+            yield from _keys(model, below)
+        else:
+            yield ".".join(below)
 
 
 def _where(dotted: str, path: Path, overrides: Mapping[str, object]) -> str:

@@ -15,6 +15,11 @@ def one_line(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode("ascii") for c in text)
 
 
+def is_text(value: str) -> bool:
+    """Whether a string from the command line or the file system was UTF-8; bytes that are not come as surrogates."""
+    return not any("\ud800" <= c <= "\udfff" for c in value)
+
+
 class InputError(ValueError):
     """Something given by the user cannot be used; ``str()`` of it is one line."""
 

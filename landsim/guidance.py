@@ -33,6 +33,8 @@ class Law:
     integral_max: float
     """Most of the sink rate's integral, m."""
     max_sink: float
+    pitch_min: float
+    pitch_max: float
     lateral_gain: float
     lateral_speed_max: float
     bank_gain: float
@@ -77,6 +79,8 @@ def law_of(aircraft: AircraftConfig, approach: ApproachConfig, gravity: float, h
         pitch_integral=a.pitch_integral_rad_per_m,
         integral_max=a.pitch_integral_max_deg * DEG / max(a.pitch_integral_rad_per_m, 1e-9),
         max_sink=a.max_sink_mps,
+        pitch_min=a.pitch_min_deg * DEG,
+        pitch_max=a.pitch_max_deg * DEG,
         lateral_gain=a.lateral_gain_per_s,
         lateral_speed_max=a.lateral_speed_max_mps,
         bank_gain=a.bank_gain_per_s,
@@ -190,6 +194,7 @@ def _descend(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tup
     airspeed = max(nav.airspeed, 0.5 * law.approach_speed)
     alpha = law.trim_alpha + law.trim_alpha_slope * (airspeed - law.approach_speed)
     pitch = alpha - wanted / airspeed + law.pitch_gain * error + law.pitch_integral * integral
+    pitch = max(law.pitch_min, min(law.pitch_max, pitch))
     command = Command(
         engaged=True,
         pitch=pitch,

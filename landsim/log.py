@@ -78,7 +78,7 @@ COLUMNS: tuple[Column, ...] = (
     # commands and controls
     Column("command_pitch_deg", "deg", "body in runway", "pitch command"),
     Column("command_roll_deg", "deg", "body in runway", "bank command"),
-    Column("command_airspeed_mps", "m/s", "", "airspeed command"),
+    Column("command_airspeed_mps", "m/s", "", "airspeed command; NaN where the throttle is told to idle"),
     Column("elevator_deg", "deg", "", "trailing edge down positive (nose down)"),
     Column("aileron_deg", "deg", "", "positive rolls right"),
     Column("rudder_deg", "deg", "", "positive yaws right"),

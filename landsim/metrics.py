@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Array: TypeAlias = NDArray[np.float64]
 Log: TypeAlias = Mapping[str, Array]
 
-ENDS = ("stopped", "timeout", "diverged", "trim_failed", "error", "structure_contact", "below_ground")
+ENDS = ("stopped", "timeout", "diverged", "trim_failed", "error", "structure_contact", "below_ground", "fault")
 """Why the simulation loop ended."""
 CRASHES = {
     "structure_contact": "a part that is not a wheel touched the ground",
@@ -31,6 +31,8 @@ BEGIN = -1000.0
 """Tracking and navigation count from here: along the runway, m."""
 EARLY_NUMBERS, LATE_NUMBERS = 6, 4
 """Degrees of freedom of a measurement of three lines, and of two."""
+COASTING_S = 1.0
+"""A filter that has believed no frame for longer is said to coast."""
 BOUNCE_S = 0.1
 """Both main wheels in the air for longer than this, between contacts, is a bounce."""
 
@@ -173,12 +175,15 @@ def judge(
     if end in CRASHES:
         faults.insert(0, (log["time_s"].size - 1, Verdict("crashed", CRASHES[end])))
     if faults:
-        return min(faults, key=lambda fault: fault[0])[1]
+        row, verdict = min(faults, key=lambda fault: fault[0])
+        return verdict._replace(reason=verdict.reason + _navigation_then(log, row))
     if end == "diverged":
         return Verdict("diverged", "the navigation filter diverged" + (f": {detail}" if detail else ""))
     if end == "timeout":
         where = "in the air" if touchdown is None else "still rolling"
         return Verdict("timeout", f"{where} at the time limit of {scenario.simulation.time_limit_s:g} s")
+    if end == "fault":
+        return Verdict("error", "the loop ended for a fault at the wheels that the log does not show")
     if touchdown is None:
         return Verdict("error", "stopped without contact of a main wheel")
     return Verdict("landed", "main wheels first, within the gear's limit, stopped on the runway")
@@ -225,9 +230,11 @@ def flare_row(log: Log, touchdown: Touchdown | None) -> int:
 
 
 def navigation_errors(log: Log, end_row: int) -> dict[str, dict[str, dict[str, Any]]]:
-    """``rms`` and ``p95`` of the errors of vision and of the filter, a quantity, and over how many ``frames``.
+    """Errors of vision and of the filter, a quantity, before ``end_row`` and past ``BEGIN``.
 
-    Both are taken over the same rows: those before ``end_row`` and past ``BEGIN`` in which both have the quantity.
+    ``rms``, ``p95`` and ``frames`` are over all rows in which the source has the quantity: for vision the frames that
+    give it, for the filter every step since its start, coasting or not.  ``paired_rms`` and ``paired_frames`` are over
+    the rows in which both have it.
     """
     result: dict[str, dict[str, dict[str, Any]]] = {"vision": {}, "fused": {}}
     counted = (np.arange(log["time_s"].size) < end_row) & (log["true_along_m"] >= BEGIN)
@@ -235,7 +242,12 @@ def navigation_errors(log: Log, end_row: int) -> dict[str, dict[str, dict[str, A
         errors = {source: error(log, source, quantity) for source in result}
         both = counted & np.isfinite(errors["vision"]) & np.isfinite(errors["fused"])
         for source, values in errors.items():
-            result[source][quantity] = _summary(values[both]) | {"frames": int(np.sum(both))}
+            own = counted & np.isfinite(values)
+            result[source][quantity] = _summary(values[own]) | {
+                "frames": int(np.sum(own)),
+                "paired_rms": rms(values[both]),
+                "paired_frames": int(np.sum(both)),
+            }
     return result
 
 
@@ -276,6 +288,7 @@ def flight_metrics(
     wall_time_s: float,
     versions: Mapping[str, str],
     detail: str = "",
+    start: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
     """All that metrics.json holds.
 
@@ -295,14 +308,16 @@ def flight_metrics(
         Of the libraries in use.
     detail : str
         What the loop says of its end.
+    start : mapping of str to float, optional
+        The start as drawn.
 
     Returns
     -------
     dict
-        ``scenario``, ``seed``, ``outcome``, ``reason``, ``in_box``, ``box`` (a limit: value, limit, ok), ``touchdown``,
-        ``bounces``, ``stop``, ``tracking`` (of the cg, to the touchdown; the glide slope also to the flare, which
-        leaves it), ``navigation`` (of the camera, to the touchdown), ``consistency``, ``end``, ``flight_time_s``,
-        ``wall_time_s``, ``versions``.  Every ``p95`` is of the magnitude.
+        ``scenario``, ``seed``, ``outcome``, ``reason``, ``start``, ``in_box``, ``box`` (a limit: value, limit, ok),
+        ``touchdown``, ``bounces``, ``stop``, ``tracking`` (of the cg, to the touchdown; the glide slope also to the
+        flare, which leaves it), ``navigation`` (of the camera, to the touchdown), ``consistency``, ``end``,
+        ``flight_time_s``, ``wall_time_s``, ``versions``.  Every ``p95`` is of the magnitude.
 
     Raises
     ------
@@ -329,6 +344,7 @@ def flight_metrics(
         "seed": seed,
         "outcome": verdict.outcome,
         "reason": verdict.reason,
+        "start": dict(start or {}),
         "in_box": all(limit["ok"] for limit in box.values()),
         "box": box,
         "touchdown": None if touchdown is None else _touchdown_dict(touchdown),
@@ -345,6 +361,16 @@ def flight_metrics(
         "wall_time_s": wall_time_s,
         "versions": dict(versions),
     }
+
+
+def _navigation_then(log: Log, row: int) -> str:
+    """What there is to say of navigation at a row in which the flight failed."""
+    if not np.isfinite(log["fused_along_m"][: row + 1]).any():
+        seen = int(np.sum(np.isfinite(log["vision_along_m"][: row + 1])))
+        return f"; navigation never started, with {seen} usable frames"
+    believed = np.flatnonzero(log["accepted"][: row + 1] == 1.0)
+    since = float(log["time_s"][row] - log["time_s"][believed[-1]]) if believed.size else float(log["time_s"][row])
+    return f"; navigation had believed no frame for {since:.1f} s" if since > COASTING_S else ""
 
 
 def _contact_faults(

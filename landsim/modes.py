@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from landsim.plant import Plant
-from landsim.resources import find_aircraft
+from landsim.config import load_aircraft
+from landsim.errors import InputError, one_line
+from landsim.plant import Plant, TrimError
 from landsim.runway import Runway
 from landsim.truth import InitialState
 from landsim.units import DEG
@@ -98,6 +99,19 @@ def table(found: tuple[Mode, ...]) -> str:
     return "\n".join(rows)
 
 
+def main(arguments: list[str]) -> int:
+    """Print the modes of the aircraft named; returns the exit code, 2 if it has none to print, told in one line."""
+    try:
+        if len(arguments) > 1 or any(name.startswith("-") for name in arguments):
+            raise InputError("usage: python -m landsim.modes AIRCRAFT, a shipped name or a folder")
+        aircraft = load_aircraft(arguments[0] if arguments else "pioneer")
+        text = table(modes(on_the_glide(aircraft.folder, aircraft.model)))
+    except (ValueError, TrimError) as error:
+        sys.stderr.write(f"landsim.modes: {one_line(str(error))}\n")
+        return 2
+    sys.stdout.write(text + "\n")
+    return 0
+
+
 if __name__ == "__main__":
-    _, _folder = find_aircraft(sys.argv[1] if len(sys.argv) > 1 else "pioneer")
-    sys.stdout.write(table(modes(on_the_glide(_folder, _folder.name))) + "\n")
+    sys.exit(main(sys.argv[1:]))

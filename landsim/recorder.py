@@ -1,10 +1,12 @@
 """What the loop keeps of a flight, and the log's table made of it.
 
-While the aircraft flies a row of numbers is appended a step; angles, errors and standard deviations are worked out
+While the aircraft flies only references are kept; vision poses, angles, errors and standard deviations are worked out
 afterwards, for all rows at once.
 """
 
 import contextlib
+from collections.abc import Iterable
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -13,8 +15,8 @@ from estimator.camera import PinholeCamera
 from estimator.fusion import InertialVisionFilter
 from estimator.innovation import camera_sigma
 from estimator.mount import Mount, camera_triads
-from estimator.so3 import Array, Vec3
-from estimator.strapdown import ACCEL_BIAS, GYRO_BIAS
+from estimator.so3 import Array, Mat3, Vec3
+from estimator.strapdown import ACCEL_BIAS, GYRO_BIAS, Inertial
 from estimator.three_line import three_line_pose
 from estimator.two_line import two_line_pose
 from landsim.log import AXES, COLUMNS, ENDS, LINES, QUANTITIES
@@ -33,19 +35,33 @@ class Body(NamedTuple):
     attitude: Array
 
 
-STEP = {
-    "time": 1, "position": 3, "velocity": 3, "attitude": 9, "airspeed": 1, "wow": 3, "surfaces": 3, "throttle": 1,
-    "ready": 1, "nav_position": 3, "nav_velocity": 3, "nav_attitude": 9, "stage": 1,
-    "engaged": 1, "command_pitch": 1, "command_roll": 1, "command_airspeed": 1, "brake": 1, "steering": 1,
-    "phase": 1, "pitot": 1, "tilt": 1, "reading": 1,
-}  # fmt: skip
-"""What `Recorder.step` takes down, in its order, and how many numbers each is."""
 FRAME = {
     "roll": 1, "nis_dof": 1, "nis": 1, "accepted": 1,
     "left_true": 4, "threshold_true": 4, "right_true": 4,
     "left_line": 3, "left_ends": 4, "threshold_line": 3, "threshold_ends": 4, "right_line": 3, "right_ends": 4,
 }  # fmt: skip
-"""The same of `Recorder.frame`."""
+"""What `Recorder.frame` takes down, in its order, and how many numbers each is."""
+
+
+def _columns(rows: int, numbers: Iterable[float]) -> Array:
+    """Numbers row by row as an array of their columns (k, rows)."""
+    return np.fromiter(numbers, float).reshape(rows, -1).T.copy()
+
+
+def _scalars(truth: Truth) -> tuple[float, ...]:
+    """Airspeed, weight on the three wheels, surfaces and throttle."""
+    return (
+        truth.airspeed, truth.wow_nose, truth.wow_left, truth.wow_right,
+        truth.elevator, truth.aileron, truth.rudder, truth.throttle,
+    )  # fmt: skip
+
+
+def _body(position: list[Vec3], velocity: list[Vec3], attitude: list[Mat3]) -> Body:
+    return Body(
+        np.fromiter(chain.from_iterable(position), float, 3 * len(position)).reshape(-1, 3),
+        np.fromiter(chain.from_iterable(velocity), float, 3 * len(velocity)).reshape(-1, 3),
+        np.fromiter(chain.from_iterable(attitude), float, 9 * len(attitude)).reshape(-1, 3, 3),
+    )
 
 
 def _named(rows: Array, widths: dict[str, int]) -> dict[str, Array]:
@@ -84,8 +100,10 @@ class Recorder:
         self._width = width
         self._mount = mount
         self._wheels = wheels
-        # flat, so that a long flight does not leave the garbage collector a hundred thousand objects to visit
-        self._steps: list[float] = []
+        self._truths: list[Truth] = []
+        self._inertials: list[Inertial] = []
+        self._commands: list[Command] = []
+        self._others: list[float] = []
         self._count = 0
         self._frames: list[float] = []
         self._frame_rows: list[int] = []
@@ -105,15 +123,10 @@ class Recorder:
     ) -> None:
         """Take down a step; the frame of the same step comes before it."""
         self._count += 1
-        position, velocity, attitude = navigator.inertial
-        self._steps += (
-            truth.time, *truth.position, *truth.velocity, *truth.R_runway_from_body, truth.airspeed,
-            truth.wow_nose, truth.wow_left, truth.wow_right,
-            truth.elevator, truth.aileron, truth.rudder, truth.throttle,
-            navigator.filter is not None, *position, *velocity, *attitude, navigator.stage,
-            command.engaged, command.pitch, command.roll, command.airspeed, command.brake, command.steering,
-            phase, pitot, tilt, reading,
-        )  # fmt: skip
+        self._truths.append(truth)
+        self._inertials.append(navigator.inertial)
+        self._commands.append(command)
+        self._others += (navigator.filter is not None, navigator.stage, phase, pitot, tilt, reading)
 
     def frame(self, view: View, result: FrameResult, running: InertialVisionFilter | None, imu: Imu) -> None:
         """Take down a camera frame."""
@@ -136,34 +149,37 @@ class Recorder:
         log = {column.name: np.full(self._count, np.nan) for column in COLUMNS}
         if self._count == 0:
             return log
-        flat = np.fromiter(self._steps, float, len(self._steps)).reshape(self._count, -1).T.copy()
-        step = _named(flat, STEP)
-        ready = step["ready"] > 0.0
-        for name in ("nav_position", "nav_velocity", "nav_attitude"):
-            step[name][:, ~ready] = np.nan
-        true = Body(step["position"].T, step["velocity"].T, step["attitude"].T.reshape(-1, 3, 3))
-        fused = Body(step["nav_position"].T, step["nav_velocity"].T, step["nav_attitude"].T.reshape(-1, 3, 3))
-        tilt, reading = step["tilt"], step["reading"]
+        ready, stage, phase, pitot, tilt, reading = _columns(self._count, self._others)
+        truths, inertials = self._truths, self._inertials
+        true = _body([t.position for t in truths], [t.velocity for t in truths], [t.R_runway_from_body for t in truths])
+        fused = _body([i.position for i in inertials], [i.velocity for i in inertials], [i.attitude for i in inertials])
+        for known in fused:
+            known[ready == 0.0] = np.nan
+        airspeed, *wow, elevator, aileron, rudder, throttle = _columns(
+            self._count, chain.from_iterable(_scalars(t) for t in truths)
+        )
+        command = dict(zip(Command._fields, _columns(self._count, chain.from_iterable(self._commands)), strict=True))
 
-        log["time_s"], log["phase"], log["stage"] = step["time"], step["phase"], step["stage"]
+        log["time_s"] = np.fromiter((t.time for t in truths), float, self._count)
+        log["phase"], log["stage"] = phase, stage
         _pose(log, "true", true, self._mount.lever, tilt)
         _pose(log, "fused", fused, self._mount.lever, reading)
-        x, y, z = step["position"]
+        x, y, z = true.position.T
         log["body_x_m"], log["body_y_m"], log["body_height_m"] = x, y, -z
         log["wheel_height_m"] = -z - true.attitude[:, 2, :] @ np.array(self._wheels)
         log["body_roll_deg"], log["body_pitch_deg"], log["body_yaw_deg"] = euler_deg(true.attitude)
         for i, axis in enumerate(AXES):
-            log[f"true_velocity_{axis}_mps"] = step["velocity"][i]
-            log[f"fused_velocity_{axis}_mps"] = step["nav_velocity"][i]
-        log["true_airspeed_mps"], log["pitot_airspeed_mps"] = step["airspeed"], step["pitot"]
-        log["wow_nose"], log["wow_left"], log["wow_right"] = step["wow"]
-        log["elevator_deg"], log["aileron_deg"], log["rudder_deg"] = step["surfaces"] / DEG
-        log["throttle"], log["brake"], log["steering"] = step["throttle"], step["brake"], step["steering"]
+            log[f"true_velocity_{axis}_mps"] = true.velocity[:, i]
+            log[f"fused_velocity_{axis}_mps"] = fused.velocity[:, i]
+        log["true_airspeed_mps"], log["pitot_airspeed_mps"] = airspeed, pitot
+        log["wow_nose"], log["wow_left"], log["wow_right"] = wow
+        log["elevator_deg"], log["aileron_deg"], log["rudder_deg"] = elevator / DEG, aileron / DEG, rudder / DEG
+        log["throttle"], log["brake"], log["steering"] = throttle, command["brake"], command["steering"]
         log["tilt_deg"], log["tilt_reading_deg"] = tilt / DEG, reading / DEG
-        engaged = step["engaged"] > 0.0
-        log["command_pitch_deg"] = np.where(engaged, step["command_pitch"] / DEG, np.nan)
-        log["command_roll_deg"] = np.where(engaged, step["command_roll"] / DEG, np.nan)
-        log["command_airspeed_mps"] = np.where(engaged, step["command_airspeed"], np.nan)
+        engaged, flying = command["engaged"] > 0.0, command["idle"] == 0.0
+        log["command_pitch_deg"] = np.where(engaged, command["pitch"] / DEG, np.nan)
+        log["command_roll_deg"] = np.where(engaged, command["roll"] / DEG, np.nan)
+        log["command_airspeed_mps"] = np.where(engaged & flying, command["airspeed"], np.nan)
         self._frame_columns(log)
         self._filter_columns(log, true, fused, reading)
         return log

@@ -32,22 +32,25 @@ def draw_run(folder: Path, scenario: "Scenario", log: Log, metrics: dict[str, An
     Returns
     -------
     list of Path
-        Those of ``PICTURES`` in the folder.
+        Those of ``PICTURES`` in the folder; none, and nothing is written, for a log without a row: no flight.
 
     Raises
     ------
     OSError
         If a picture cannot be written; what stood there before then stands there still.
     """
+    if not log["time_s"].size:
+        return []
     from landsim import plots  # matplotlib takes most of a second
 
-    figures = (
-        plots.profile_and_plan(log, scenario, metrics),
-        plots.navigation_errors(log, metrics),
-        plots.controls_and_attitude(log, metrics),
-        plots.camera_views(log, scenario, metrics),
-        plots.consistency(log, scenario, metrics),
+    draw = (
+        plots.profile_and_plan,
+        plots.navigation_errors,
+        plots.controls_and_attitude,
+        plots.camera_views,
+        plots.consistency,
     )
+    figures = [picture(log, scenario, metrics) for picture in draw]
     return [_save(figure, folder / name) for figure, name in zip(figures, PICTURES, strict=True)]
 
 

@@ -1,22 +1,24 @@
 """Run folders: a flight's scenario.toml, log.parquet, metrics.json and pictures, written as a whole or not at all.
 
-A run is written into a hidden folder beside its place, ``.<name>.partial``, and then renamed.  What a killed process
-leaves behind is such a hidden folder, never half a run.
+A run is written into a hidden folder beside its place, ``.<name>.partial``, and then renamed.  Making that folder
+reserves the place: only one process can.  What a killed process leaves behind is such a folder, never half a run.
 """
 
 import json
 import math
-import os
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from itertools import count, takewhile
+from itertools import takewhile
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Annotated, Any, NamedTuple, Protocol
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from landsim.config import Scenario, load_scenario, resolved_toml
-from landsim.errors import RunFolderError
-from landsim.log import Log, load_log, save_log
+from landsim.errors import RunFolderError, is_text, one_line, what_is_wrong
+from landsim.log import COLUMNS, Log, load_log, save_log
+from landsim.resources import shipped_scenarios
 
 SCENARIO_FILE = "scenario.toml"
 LOG_FILE = "log.parquet"
@@ -34,6 +36,41 @@ class Flown(Protocol):
     @property
     def log(self) -> Log:
         """As in log.parquet."""
+
+
+class _Needed(BaseModel):
+    """What the pictures and a repetition need of metrics.json; there is more in it."""
+
+    model_config = ConfigDict(strict=True)
+
+
+class _Limit(_Needed):
+    ok: bool
+
+
+class _Stop(_Needed):
+    x_m: float
+
+
+class _Touchdown(_Needed):
+    time_s: float
+    x_m: float
+    y_m: float
+    sink_rate_mps: float
+    ground_speed_mps: float
+    pitch_deg: float
+    bank_deg: float
+
+
+class _Metrics(_Needed):
+    scenario: str
+    seed: Annotated[int, Field(ge=0)]
+    outcome: str
+    reason: str
+    in_box: bool
+    box: dict[str, _Limit]
+    touchdown: _Touchdown | None
+    stop: _Stop | None
 
 
 class Run(NamedTuple):
@@ -68,14 +105,15 @@ def new_run(name: str, out: Path | None = None, root: Path = Path("runs")) -> It
     Raises
     ------
     RunFolderError
-        Before anything is yielded, if the folder cannot be written, is a file or is not empty.
+        Before anything is yielded, if the folder cannot be written, is a file or is not empty, or if another process is
+        writing it.
     """
     final = None if out is None else _checked(out)
     parent = root if final is None else final.parent
     made = _make_parents(parent, root if out is None else out)
     try:
         try:
-            place = _numbered(root, name) if final is None else _beside(final)
+            place = _numbered(root, name) if out is None or final is None else _beside(final, out)
         except OSError as error:
             raise RunFolderError(f"{out or root}: cannot be written: {error.strerror}") from None
         try:
@@ -92,14 +130,21 @@ def new_run(name: str, out: Path | None = None, root: Path = Path("runs")) -> It
 def write_run(folder: Path, scenario: Scenario, flight: Flown) -> None:
     """Write scenario.toml, log.parquet and metrics.json into an existing folder.
 
+    The comments at the head of scenario.toml name the scenario, the seed and the command that repeats the flight.
+
     Raises
     ------
     RunFolderError
         If a file cannot be written.
     """
-    first_line = f"# {scenario.name}, resolved: every key with the value that was flown.\n"
+    seed = flight.metrics["seed"]
+    head = (
+        f"# {one_line(scenario.name)}, seed {seed}, resolved: every key with the value that was flown.\n"
+        f"# The same flight again: landsim run DIR, where DIR is the folder of this file;"
+        f" without its folder: landsim run {SCENARIO_FILE} --seed {seed}\n"
+    )
     try:
-        (folder / SCENARIO_FILE).write_text(first_line + resolved_toml(scenario), encoding="utf-8")
+        (folder / SCENARIO_FILE).write_text(head + resolved_toml(scenario), encoding="utf-8")
         save_log(folder / LOG_FILE, flight.log)
         text = json.dumps(as_json(flight.metrics), indent=2, ensure_ascii=False, allow_nan=False)
         (folder / METRICS_FILE).write_text(text + "\n", encoding="utf-8")
@@ -117,16 +162,81 @@ def read_run(folder: Path) -> Run:
     ScenarioError
         If its scenario cannot be used any more.
     """
-    for name in FILES:
+    _must_hold(folder, FILES)
+    metrics = _read_metrics(folder)
+    scenario = load_scenario(folder / SCENARIO_FILE).model_copy(update={"name": metrics["scenario"]})
+    try:
+        log = load_log(folder / LOG_FILE)
+    except RunFolderError:
+        raise
+    except (ValueError, TypeError) as error:  # a column that is not numbers
+        raise RunFolderError(f"{folder}: is not a run: {LOG_FILE}: {error}") from None
+    missing = [column.name for column in COLUMNS if column.name not in log]
+    if missing:
+        others = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
+        raise RunFolderError(f"{folder}: is not a run: {LOG_FILE}: column {missing[0]} is missing{others}")
+    return Run(scenario, log, metrics)
+
+
+def load_flight(name_or_path: str, overrides: Mapping[str, object] | None = None) -> tuple[Scenario, int | None]:
+    """A scenario to fly, and the seed to repeat if it was named by the folder of a run.
+
+    Parameters
+    ----------
+    name_or_path : str
+        As for `landsim.config.load_scenario`, or a folder that holds a run.  A shipped name wins over a folder.
+    overrides : mapping, optional
+        As there.
+
+    Returns
+    -------
+    (Scenario, int or None)
+        Of a run, under the name it was flown by.
+
+    Raises
+    ------
+    RunFolderError
+        If a folder does not hold a run.
+    ScenarioError
+        If the scenario cannot be used.
+    """
+    folder = Path(name_or_path)
+    try:
+        may_hold_a_run = bool(name_or_path) and name_or_path not in shipped_scenarios() and folder.is_dir()
+    except OSError:  # a name too long
+        may_hold_a_run = False
+    if not may_hold_a_run:
+        return load_scenario(name_or_path, overrides), None
+    _must_hold(folder, (SCENARIO_FILE, METRICS_FILE))
+    metrics = _read_metrics(folder)
+    scenario = load_scenario(folder / SCENARIO_FILE, overrides)
+    return scenario.model_copy(update={"name": metrics["scenario"]}), metrics["seed"]
+
+
+def _must_hold(folder: Path, names: tuple[str, ...]) -> None:
+    for name in names:
         if not (folder / name).is_file():
             raise RunFolderError(f"{folder}: is not a run: {name} is missing")
+
+
+def _read_metrics(folder: Path) -> dict[str, Any]:
+    """What metrics.json holds, once it is known to be a flight's."""
+    what = f"{folder}: is not a run: {METRICS_FILE}"
     try:
-        metrics = json.loads((folder / METRICS_FILE).read_text(encoding="utf-8"))
-        name = str(metrics["scenario"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise RunFolderError(f"{folder / METRICS_FILE}: cannot be read as a flight's metrics: {error!r}") from None
-    scenario = load_scenario(folder / SCENARIO_FILE).model_copy(update={"name": name})
-    return Run(scenario, load_log(folder / LOG_FILE), metrics)
+        metrics: dict[str, Any] = json.loads((folder / METRICS_FILE).read_text(encoding="utf-8"))
+        needed = _Metrics.model_validate(metrics)
+    except ValidationError as failure:
+        error = failure.errors(include_url=False)[0]
+        place = ".".join(map(str, error["loc"]))
+        raise RunFolderError(f"{what}: {place}{' ' if place else ''}{what_is_wrong(dict(error))}") from None
+    except OSError as error:
+        raise RunFolderError(f"{folder / METRICS_FILE}: cannot be read: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:
+        raise RunFolderError(f"{what}: not JSON: {error}") from None
+    name = needed.scenario
+    if not name or name != Path(name).name or "\0" in name or not is_text(name):  # it becomes part of a folder's name
+        raise RunFolderError(f'{what}: scenario cannot be a name: "{name}"')
+    return metrics
 
 
 def as_json(value: Any) -> Any:
@@ -146,12 +256,14 @@ def _checked(out: Path) -> Path:
     """The folder to make, links resolved, if a run may be written there."""
     try:
         final = out.expanduser().resolve()
+        if not is_text(str(final)):  # Parquet and TOML could not say it
+            raise RunFolderError(f"{out}: cannot be written: its path must be UTF-8 text")
         if final.is_dir():
             if any((final / name).exists() for name in FILES):
                 raise RunFolderError(f"{out}: already holds a run; name a new folder")
             if any(final.iterdir()):
                 raise RunFolderError(f"{out}: is not empty; name a new folder")
-            if final.is_mount() or final == Path.cwd():
+            if final.is_mount() or final.samefile("."):
                 raise RunFolderError(f"{out}: cannot be replaced by the finished run; name a folder inside it")
         elif final.exists():
             raise RunFolderError(f"{out}: is a file; name a new folder")
@@ -186,15 +298,21 @@ def _remove_empty(folders: list[Path]) -> None:
             break
 
 
-def _beside(final: Path) -> Place:
-    for attempt in count():
-        temporary = final.with_name(f".{final.name}.{os.getpid()}-{attempt}.partial")
-        try:
-            temporary.mkdir()
-        except FileExistsError:
-            continue
-        return Place(temporary, final)
-    raise AssertionError
+def _beside(final: Path, out: Path) -> Place:
+    """Reserve a name by making its temporary folder, which only one process can."""
+    temporary = final.with_name(f".{final.name}.partial")
+    try:
+        temporary.mkdir()
+    except FileExistsError:
+        raise RunFolderError(
+            f"{out}: is being written by another run; if none is at work, remove {temporary}, which one left behind"
+        ) from None
+    try:
+        _checked(out)  # another may have finished it between our look and our mkdir
+    except BaseException:
+        temporary.rmdir()
+        raise
+    return Place(temporary, final)
 
 
 def _finish(place: Place) -> None:

@@ -26,8 +26,10 @@ def _refused(message: str, key: str | None = None) -> PydanticCustomError:
     return PydanticCustomError(OWN_CHECK, "{message}", {"message": message, "key": key or ""})
 
 
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
+LARGEST = 1e6
+"""No quantity of a landing is larger, in any of the units that are used."""
+Positive = Annotated[float, Field(gt=0.0, le=LARGEST)]
+NotNegative = Annotated[float, Field(ge=0.0, le=LARGEST)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 HeadingDeg = Annotated[float, Field(ge=-360.0, le=360.0)]
 PointM = Annotated[tuple[float, float, float], BeforeValidator(_tuple_from_list)]
@@ -50,9 +52,9 @@ class AircraftChoice(Section):
 class RunwayConfig(Section):
     """``[runway]``: a flat, straight runway on the WGS 84 ellipsoid."""
 
-    width_m: Positive = 30.0
+    width_m: Annotated[float, Field(gt=0.0, le=1000.0)] = 30.0
     """Between the painted edges."""
-    length_m: Positive = 2000.0
+    length_m: Annotated[float, Field(gt=0.0, le=1e5)] = 2000.0
     heading_deg: HeadingDeg = 0.0
     """True heading of the landing direction."""
     latitude_deg: Annotated[float, Field(ge=-89.0, le=89.0)] = 0.0
@@ -73,9 +75,9 @@ class ApproachConfig(Section):
 class StartConfig(Section):
     """``[start]``: the centre of gravity at the start, and the σ of what each seed adds, unknown to navigation."""
 
-    along_m: Annotated[float, Field(lt=0.0)] = -1000.0
+    along_m: Annotated[float, Field(lt=0.0, ge=-1e5)] = -1000.0
     """From the threshold, negative before it."""
-    cross_m: float = 0.0
+    cross_m: Annotated[float, Field(ge=-1e5, le=1e5)] = 0.0
     """Right of the centreline."""
     height_m: Positive = 60.0
     """Above the threshold."""
@@ -94,15 +96,15 @@ class CameraConfig(Section):
     """``[camera]``: lens, image and the noise of the lines."""
 
     focal_length_mm: Positive = 12.5
-    pixel_um: Positive = 9.9
-    width_px: Annotated[int, Field(ge=16)] = 658
-    height_px: Annotated[int, Field(ge=16)] = 494
-    rate_hz: Positive = 30.0
+    pixel_um: Annotated[float, Field(ge=0.01, le=LARGEST)] = 9.9
+    width_px: Annotated[int, Field(ge=16, le=20000)] = 658
+    height_px: Annotated[int, Field(ge=16, le=20000)] = 494
+    rate_hz: Annotated[float, Field(ge=0.1, le=10000.0)] = 30.0
     line_noise: Literal["edge-points", "endpoints"] = "edge-points"
     """What is noisy: every point along a line, or only the two ends of what is seen of it."""
     noise_px: NotNegative = 2.0**0.5
     """1 σ of each noisy point, in u and in v."""
-    point_spacing_px: Annotated[float, Field(ge=0.01)] = 1.0
+    point_spacing_px: Annotated[float, Field(ge=0.1, le=LARGEST)] = 1.0
     """Between the points along a line, with ``edge-points``."""
     min_line_px: Annotated[float, Field(ge=2.0)] = 8.0
     """A shorter line is not reported."""
@@ -125,7 +127,7 @@ class CameraConfig(Section):
 class ImuConfig(Section):
     """``[imu]``: the one inertial unit; 1 σ each, drawn per seed and axis; a drift is a random walk."""
 
-    rate_hz: Positive = 120.0
+    rate_hz: Annotated[float, Field(ge=1.0, le=10000.0)] = 120.0
     gyro_bias_deg_h: NotNegative = 10.0
     gyro_bias_drift_deg_h_sqrt_h: NotNegative = 3.0
     """deg/h after one hour."""
@@ -177,7 +179,7 @@ class SimulationConfig(Section):
 
     rate_hz: Annotated[float, Field(ge=20.0, le=10000.0)] = 120.0
     """``imu.rate_hz`` must divide it, and ``camera.rate_hz`` must divide both."""
-    time_limit_s: Annotated[float, Field(gt=0.0, le=36000.0)] = 120.0
+    time_limit_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 120.0
 
 
 class BoxConfig(Section):
@@ -284,6 +286,9 @@ class ApproachGains(Section):
     pitch_integral_max_deg: Positive = 3.0
     """Most that the integral may ask for."""
     max_sink_mps: Positive
+    pitch_min_deg: Annotated[float, Field(ge=-45.0, le=0.0)] = -10.0
+    pitch_max_deg: Annotated[float, Field(ge=0.0, le=45.0)] = 12.0
+    """Least and most pitch that is commanded."""
     lateral_gain_per_s: NotNegative
     """Lateral speed asked for, per metre off the centreline."""
     lateral_speed_max_mps: Positive

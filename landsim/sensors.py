@@ -34,7 +34,7 @@ from landsim.units import (
 )
 
 BLOCK = 256
-"""Samples of the inertial unit whose noise is drawn at once."""
+"""Samples whose noise is drawn at once."""
 
 PixelSegment = tuple[float, float, float, float]
 
@@ -142,6 +142,20 @@ class Imu:
         )  # fmt: skip
 
 
+class _Noise:
+    """White noise, drawn a block at a time."""
+
+    def __init__(self, sigma: float, rng: Generator) -> None:
+        self._sigma = sigma
+        self._rng = rng
+        self._drawn: list[float] = []
+
+    def next(self) -> float:
+        if not self._drawn:
+            self._drawn = (self._sigma * self._rng.standard_normal(BLOCK)).tolist()
+        return self._drawn.pop()
+
+
 class Pitot:
     """The airspeed: a first-order lag, and white noise on each sample.
 
@@ -153,23 +167,18 @@ class Pitot:
     dt : float
         Between samples, s.
     start : Truth
-    limit : int
-        Most samples that will be asked for.
     rng : Generator
     """
 
-    def __init__(self, config: PitotConfig, dt: float, start: Truth, limit: int, rng: Generator) -> None:
-        self._noise: list[float] = (config.noise_mps * rng.standard_normal(limit)).tolist()
+    def __init__(self, config: PitotConfig, dt: float, start: Truth, rng: Generator) -> None:
+        self._noise = _Noise(config.noise_mps, rng)
         self._gain = 1.0 if config.lag_s == 0.0 else 1.0 - math.exp(-dt / config.lag_s)
         self._lagged = start.airspeed
-        self._count = 0
 
     def sample(self, truth: Truth) -> float:
         """Airspeed, m/s."""
         self._lagged += self._gain * (truth.airspeed - self._lagged)
-        noise = self._noise[self._count]
-        self._count += 1
-        return max(self._lagged + noise, 0.0)
+        return max(self._lagged + self._noise.next(), 0.0)
 
 
 class TiltMount:
@@ -180,8 +189,6 @@ class TiltMount:
     config : MountConfig
     dt : float
         Between calls of `move`, s.
-    limit : int
-        Most readings that will be asked for.
     rng : Generator
 
     Attributes
@@ -190,11 +197,10 @@ class TiltMount:
         True angle, rad, down positive.
     """
 
-    def __init__(self, config: MountConfig, dt: float, limit: int, rng: Generator) -> None:
+    def __init__(self, config: MountConfig, dt: float, rng: Generator) -> None:
         self.tilt = config.tilt_early_deg * DEG
         self._step = config.tilt_rate_deg_s * DEG * dt
-        self._noise: list[float] = (config.tilt_reading_sigma_deg * DEG * rng.standard_normal(limit)).tolist()
-        self._count = 0
+        self._noise = _Noise(config.tilt_reading_sigma_deg * DEG, rng)
 
     def move(self, command: float) -> None:
         """Move toward an angle (rad) for one step."""
@@ -202,9 +208,7 @@ class TiltMount:
 
     def read(self) -> float:
         """The angle as read, rad."""
-        noise = self._noise[self._count]
-        self._count += 1
-        return self.tilt + noise
+        return self.tilt + self._noise.next()
 
 
 class View(NamedTuple):

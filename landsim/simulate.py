@@ -8,6 +8,7 @@ import importlib.metadata
 import math
 import platform
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple
@@ -15,8 +16,9 @@ from typing import Any, NamedTuple
 from numpy.random import Generator, SeedSequence, default_rng
 
 from estimator.alignment import Incidence
-from estimator.so3 import Array
+from estimator.so3 import Array, Vec3, rotate
 from landsim.config import AircraftConfig, Scenario
+from landsim.errors import InputError
 from landsim.guidance import INITIAL, guide, law_of
 from landsim.metrics import flight_metrics
 from landsim.navigation import Navigator, mount_of
@@ -31,6 +33,8 @@ STANDSTILL = 0.05
 """Ground speed below which the aircraft stands, m/s."""
 STANDSTILL_TIME = 0.5
 """For how long before the flight is over, s."""
+AFTERMATH = 3.0
+"""For how long a flight goes on after what failed it, s."""
 BELOW_GROUND = -5.0
 """Height of the centre of gravity at which the flight is over, m."""
 
@@ -99,9 +103,13 @@ def fly(scenario: Scenario, seed: int = 0) -> Flight:
 
     Raises
     ------
+    InputError
+        If the aircraft's model does not load.
     ValueError
-        If the scenario is not a flight, or the seed is negative.
+        If the scenario is not a flight, or the seed is not a whole number of zero or more.
     """
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise ValueError(f"seed must be a whole number that is not negative, not {seed!r}")
     if scenario.kind != "flight":
         raise ValueError(f"{scenario.name}: a scenario of the kind {scenario.kind!r} is not flown")
     began = time.perf_counter()
@@ -109,8 +117,12 @@ def fly(scenario: Scenario, seed: int = 0) -> Flight:
     recorder = Recorder(
         camera_of(scenario.camera), scenario.runway.width_m, mount_of(aircraft.mount), aircraft.gear.main_wheels_body_m
     )
+    seeds = SeedSequence(seed).spawn(5)
+    start = draw_start(scenario, default_rng(seeds[0]))
     try:
-        end = _fly(scenario, seed, recorder)
+        end = _fly(scenario, start, seeds[1:], recorder)
+    except InputError:
+        raise
     except (StepError, ArithmeticError, ValueError) as error:  # LinAlgError is a ValueError
         end = End("error", f"{type(error).__name__}: {error}")
     log = recorder.table()
@@ -121,6 +133,13 @@ def fly(scenario: Scenario, seed: int = 0) -> Flight:
         seed=seed,
         end=end.kind,
         detail=end.detail,
+        start={
+            "along_m": start.position[0],
+            "cross_m": start.position[1],
+            "height_m": -start.position[2],
+            "heading_deg": start.heading / DEG,
+            "speed_mps": start.speed,
+        },
         wall_time_s=time.perf_counter() - began,
         versions=_versions(),
     )
@@ -134,7 +153,7 @@ class End(NamedTuple):
     detail: str = ""
 
 
-def _fly(scenario: Scenario, seed: int, recorder: Recorder) -> End:
+def _fly(scenario: Scenario, start: InitialState, seeds: Sequence[SeedSequence], recorder: Recorder) -> End:
     """The loop; says why it ended."""
     aircraft, settings = scenario.aircraft_config, scenario.simulation
     dt = 1.0 / settings.rate_hz
@@ -143,18 +162,22 @@ def _fly(scenario: Scenario, seed: int, recorder: Recorder) -> End:
     imu_dt = imu_every * dt
     limit = math.ceil(settings.time_limit_s * settings.rate_hz) + 1
 
-    start_rng, imu_rng, pitot_rng, mount_rng, camera_rng = (default_rng(s) for s in SeedSequence(seed).spawn(5))
+    imu_rng, pitot_rng, mount_rng, camera_rng = (default_rng(seed) for seed in seeds)
     runway = runway_of(scenario)
     site = site_of(runway)
     plant = Plant(aircraft.folder, aircraft.model, runway, settings.rate_hz)
+    wheels = aircraft.gear.main_wheels_body_m
+    height = -start.position[2]
+    if height < wheels[2]:
+        return End("trim_failed", f"it starts under the ground, {height:.2f} m up with wheels {wheels[2]:.2f} m lower")
     try:
-        truth = plant.start(draw_start(scenario, start_rng))
+        truth = plant.start(start)
     except TrimError as error:
         return End("trim_failed", str(error))
 
     imu = Imu(scenario.imu, site, truth, imu_rng)
-    pitot = Pitot(scenario.pitot, dt, truth, limit, pitot_rng)
-    mount = TiltMount(aircraft.mount, dt, limit, mount_rng)
+    pitot = Pitot(scenario.pitot, dt, truth, pitot_rng)
+    mount = TiltMount(aircraft.mount, dt, mount_rng)
     camera = LineCamera(scenario.camera, aircraft.mount.position_body_m, runway, camera_rng)
     navigator = Navigator(
         camera.camera,
@@ -176,6 +199,7 @@ def _fly(scenario: Scenario, seed: int, recorder: Recorder) -> End:
     rate, side_force = _ZERO, 0.0
     standing = 0.0
     diverged: str | None = None
+    faulty, mains_down = math.inf, False
     for step in range(limit):
         airspeed = pitot.sample(truth)
         if step % imu_every == 0:
@@ -196,6 +220,11 @@ def _fly(scenario: Scenario, seed: int, recorder: Recorder) -> End:
         recorder.step(truth, navigator, command, guidance.phase, airspeed, mount.tilt, tilt_reading)
         if diverged is not None:
             return End("diverged", diverged)
+        if truth.wow_nose or truth.wow_left or truth.wow_right:
+            faulty = min(faulty, _fault_time(truth, runway, wheels, mains_down))
+            mains_down = mains_down or truth.wow_left or truth.wow_right
+            if truth.time > faulty + AFTERMATH:
+                return End("fault")
         standing = standing + dt if stands(truth) else 0.0
         if standing > STANDSTILL_TIME:
             return End("stopped")
@@ -209,6 +238,17 @@ def _fly(scenario: Scenario, seed: int, recorder: Recorder) -> End:
 
 
 _ZERO = (0.0, 0.0, 0.0)
+
+
+def _fault_time(truth: Truth, runway: Runway, wheels: Vec3, mains_down: bool) -> float:
+    """The time, if a state on the wheels fails the landing: nose wheel first, or main wheels off the runway."""
+    x, y, _ = rotate(truth.R_runway_from_body, wheels)
+    x, y = x + truth.position[0], y + truth.position[1]
+    on_it = 0.0 <= x <= runway.length and abs(y) <= 0.5 * runway.width
+    mains = truth.wow_left or truth.wow_right
+    if (truth.wow_nose and not mains_down) or (mains and not on_it):
+        return truth.time
+    return math.inf
 
 
 def stands(truth: Truth) -> bool:

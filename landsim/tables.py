@@ -1,24 +1,23 @@
-"""The table at the end of a flight, from its metrics."""
+"""The tables at the end of a flight, from its metrics; in a narrow terminal their columns go below each other."""
 
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from landsim.errors import one_line
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
+    from rich.text import Text
 
 _NAMES = {
-    "along": "along",
-    "cross": "cross",
-    "height": "height",
-    "roll": "roll",
-    "pitch": "pitch",
-    "yaw": "yaw",
-    "glide_slope": "off the glide slope",
-    "glide_slope_to_flare": "the same, to the flare",
-    "localizer": "off the centreline",
+    "glide_slope_m": "off the glide slope",
+    "glide_slope_to_flare_m": "off the glide slope, to the flare",
+    "localizer_m": "off the centreline",
 }
 _UNITS = {"m": "m", "deg": "°", "mps": "m/s", "s": "s"}
+NARROWEST = 40
+"""Columns of a terminal in which every table has room, folded; a narrower terminal has to break the lines itself."""
 
 
 def number(value: float | None, unit: str = "") -> str:
@@ -30,13 +29,15 @@ def number(value: float | None, unit: str = "") -> str:
     return f"{value:.{digits}f}{space if unit else ''}{unit}"
 
 
-def flight_tables(metrics: Mapping[str, Any]) -> "Iterable[RenderableType]":
+def flight_tables(metrics: Mapping[str, Any], width: int = 100) -> "Iterator[RenderableType]":
     """What a flight was worth: its outcome in a line, then touchdown and stop, tracking and navigation.
 
     Parameters
     ----------
     metrics : mapping
         As in metrics.json: None for what does not exist.
+    width : int
+        Columns of the terminal, at least ``NARROWEST``: no figure is cut.
     """
     from rich.text import Text
 
@@ -44,61 +45,120 @@ def flight_tables(metrics: Mapping[str, Any]) -> "Iterable[RenderableType]":
     verdict = "in the box" if metrics["in_box"] else "not in the box"
     reason = metrics.get("reason")
     yield Text.assemble(
-        f"{metrics['scenario']}, seed {metrics['seed']}: ",
+        f"{one_line(metrics['scenario'])}, seed {metrics['seed']}: ",
         (metrics["outcome"], "bold green" if landed else "bold red"),
-        f", {verdict}" if landed else f": {reason}" if reason else "",
+        f", {verdict}" if landed else f": {one_line(reason)}" if reason else "",
     )
-    yield _touchdown(metrics)
-    yield _accuracy(metrics)
+    for sheet in (_touchdown(metrics), _tracking(metrics), _navigation(metrics)):
+        yield from _fitting(sheet, width)
+        if sheet.note:
+            yield Text(sheet.note + "\n", style="dim")
 
 
-def _table(*columns: str) -> "Table":
+class _Sheet(NamedTuple):
+    """A table before it is laid out: its headings, and as many cells in every row."""
+
+    headings: Sequence[str]
+    rows: "Sequence[Sequence[str | Text]]"
+    note: str = ""
+
+
+def _fitting(sheet: _Sheet, width: int) -> "Iterator[Table]":
+    """The sheet as one table, or as several, each with the first column, where it is too wide."""
+    columns: list[int] = []
+    for i in range(1, len(sheet.headings)):
+        if columns and _least_width(sheet, [*columns, i]) > width:
+            yield _table(sheet, columns)
+            columns = []
+        columns.append(i)
+    yield _table(sheet, columns)
+
+
+def _table(sheet: _Sheet, columns: Sequence[int]) -> "Table":
     from rich import box
     from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for i, column in enumerate(columns):
-        table.add_column(column, justify="left" if i == 0 else "right", no_wrap=True)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
+    table.add_column(sheet.headings[0], min_width=_longest_word(sheet))
+    for i in columns:
+        table.add_column(sheet.headings[i], justify="right", no_wrap=True)
+    for row in sheet.rows:
+        table.add_row(row[0], *(row[i] for i in columns))
     return table
 
 
-def _touchdown(metrics: Mapping[str, Any]) -> "Table":
-    touchdown, stop, limits = metrics["touchdown"] or {}, metrics["stop"] or {}, metrics.get("box") or {}
-    table = _table("touchdown", "value", "box", "")
+def _least_width(sheet: _Sheet, columns: Sequence[int]) -> int:
+    """Columns of the terminal that a table of these needs, with the words of its first column below each other."""
+    cells = (sheet.headings, *sheet.rows)
+    figures = sum(max(len(line) for row in cells for line in str(row[i]).split("\n")) for i in columns)
+    return 2 + _longest_word(sheet) + figures + 2 * len(columns)  # a space at either edge, two between columns
 
-    def row(name: str, value: float | None, unit: str, *keys: str) -> None:
+
+def _longest_word(sheet: _Sheet) -> int:
+    return max(len(word) for row in (sheet.headings, *sheet.rows) for word in str(row[0]).split())
+
+
+def _touchdown(metrics: Mapping[str, Any]) -> _Sheet:
+    from rich.text import Text
+
+    touchdown, stop, limits = metrics["touchdown"] or {}, metrics["stop"] or {}, metrics.get("box") or {}
+    rows: list[list[str | Text]] = []
+
+    def row(name: str, value: float | None, unit: str, sign: str = "", *keys: str) -> None:
         known = [limits[key] for key in keys if key in limits]
         bounds = " … ".join(f"{limit['limit']:g}" for limit in known)
-        bounds = f"{'≤ ' if len(known) == 1 else ''}{bounds} {unit}" if known else ""
+        bounds = f"{sign} {bounds}{'' if unit == '°' else ' '}{unit}".lstrip() if known else ""
         kept = all(limit["ok"] for limit in known)
-        mark = "" if not known else "[green]ok[/]" if kept else "[red]out[/]"
-        table.add_row(name, number(value, unit), bounds.replace(" °", "°"), mark)
+        mark = Text("" if not known else "ok" if kept else "out", style="green" if kept else "red")
+        rows.append([name, number(value, unit), bounds, mark])
 
-    row("past the threshold", touchdown.get("x_m"), "m", "along_min_m", "along_max_m")
-    row("right of the centreline", touchdown.get("y_m"), "m", "cross_max_m")
-    row("sink rate", touchdown.get("sink_rate_mps"), "m/s", "sink_max_mps")
-    row("bank", touchdown.get("bank_deg"), "°", "bank_max_deg")
+    row("past the threshold", touchdown.get("x_m"), "m", "", "along_min_m", "along_max_m")
+    row("right of the centreline", touchdown.get("y_m"), "m", "±", "cross_max_m")
+    row("sink rate", touchdown.get("sink_rate_mps"), "m/s", "≤", "sink_max_mps")
+    row("bank", touchdown.get("bank_deg"), "°", "±", "bank_max_deg")
     row("pitch", touchdown.get("pitch_deg"), "°")
     row("heading error", touchdown.get("heading_error_deg"), "°")
     row("ground speed", touchdown.get("ground_speed_mps"), "m/s")
     row("stop, past the threshold", stop.get("x_m"), "m")
-    row("stop, right of the centreline", stop.get("y_m"), "m", "stop_cross_max_m")
-    return table
+    row("stop, right of the centreline", stop.get("y_m"), "m", "±", "stop_cross_max_m")
+    return _Sheet(("touchdown", "value", "box", ""), rows)
 
 
-def _accuracy(metrics: Mapping[str, Any]) -> "Table":
-    table = _table("errors", "rms", "p95", "vision rms", "vision p95")
-
-    def row(key: str, own: Mapping[str, Any], vision: Mapping[str, Any] | None = None) -> None:
+def _tracking(metrics: Mapping[str, Any]) -> _Sheet:
+    tracking = metrics["tracking"]
+    order = [*(key for key in _NAMES if key in tracking), *(key for key in tracking if key not in _NAMES)]
+    rows = []
+    for key in order:
         name, _, suffix = key.rpartition("_")
-        unit = _UNITS[suffix]
-        figures = [number(source[kind], unit) for source in (own, vision) if source for kind in ("rms", "p95")]
-        table.add_row(_NAMES.get(name, name), *figures)
+        rows.append([_NAMES.get(key, name), *(number(tracking[key][kind], _UNITS[suffix]) for kind in ("rms", "p95"))])
+    return _Sheet(("tracking", "rms", "p95"), rows)
 
-    for key, figures in metrics["tracking"].items():
-        row(key, figures)
-    table.add_section()
-    navigation = metrics["navigation"]
-    for key, figures in navigation["fused"].items():
-        row(key, figures, navigation["vision"][key])
-    return table
+
+_OWN = (("fused rms", "fused", "rms"), ("fused p95", "fused", "p95"))
+_BOTH = (("both: fused rms", "fused", "paired_rms"), ("both: vision rms", "vision", "paired_rms"))
+_VISION = (("vision rms", "vision", "rms"), ("vision p95", "vision", "p95"))
+
+
+def _navigation(metrics: Mapping[str, Any]) -> _Sheet:
+    """Errors of the filter and of vision; those over the frames that both have are told apart from those over all."""
+    fused, vision = (metrics["navigation"][source] for source in ("fused", "vision"))
+    columns = (
+        *_OWN,
+        *_VISION,
+        ("both: fused rms", "fused", "paired_rms"),
+        ("both: vision rms", "vision", "paired_rms"),
+    )
+    note = f"fused: {_frames(fused, 'frames', 'steps')}; vision: {_frames(vision, 'frames')}"
+    note += f"; both: {_frames(vision, 'paired_frames')} that have both"
+    rows = []
+    for quantity in fused:
+        name, _, suffix = quantity.rpartition("_")
+        sources = {"fused": fused[quantity], "vision": vision[quantity]}
+        rows.append([f"{name}, {_UNITS[suffix]}", *(number(sources[source].get(kind)) for _, source, kind in columns)])
+    return _Sheet(("navigation", *(heading.replace(" ", "\n") for heading, _, _ in columns)), rows, note)
+
+
+def _frames(figures: Mapping[str, Mapping[str, Any]], key: str, what: str = "frames") -> str:
+    """Over how many frames the quantities were counted: a number, or the least and the greatest."""
+    counts = sorted({of[key] for of in figures.values() if key in of})
+    return f"{' to '.join(map(str, counts[:: len(counts) - 1 or 1]))} {what}"

@@ -45,7 +45,16 @@ def fake_flight(scenario: str = "landing", seed: int = 0) -> FakeFlight:
     nan = float("nan")
     log = {column.name: np.array([i + 0.125, nan, -1e-300]) for i, column in enumerate(COLUMNS)}
     navigation = {
-        source: {quantity: {"rms": np.float64(scale), "p95": 2.0 * scale} for quantity in QUANTITIES}
+        source: {
+            quantity: {
+                "rms": np.float64(scale),
+                "p95": 2.0 * scale,
+                "frames": 700,
+                "paired_rms": 0.5 * scale,
+                "paired_frames": 640 + i,
+            }
+            for i, quantity in enumerate(QUANTITIES)
+        }
         for source, scale in (("vision", 1.5), ("fused", 0.25))
     }
     metrics: dict[str, Any] = {
@@ -57,9 +66,11 @@ def fake_flight(scenario: str = "landing", seed: int = 0) -> FakeFlight:
         "box": {
             "along_min_m": {"value": 265.2, "limit": 100.0, "ok": True},
             "along_max_m": {"value": 265.2, "limit": 450.0, "ok": True},
+            "cross_max_m": {"value": 0.3125, "limit": 2.0, "ok": True},
             "sink_max_mps": {"value": 1.25, "limit": 1.0, "ok": False},
         },
         "touchdown": {
+            "time_s": 30.0,
             "x_m": 265.2,
             "y_m": -0.3125,
             "sink_rate_mps": 1.25,
@@ -69,7 +80,11 @@ def fake_flight(scenario: str = "landing", seed: int = 0) -> FakeFlight:
             "heading_error_deg": nan,
         },
         "stop": {"x_m": 612.0, "y_m": 0.2, "time_s": 45.0},
-        "tracking": {"glide_slope_m": {"rms": 0.5, "p95": 1.0}, "localizer_m": {"rms": 1.2, "p95": 4.0}},
+        "tracking": {
+            "glide_slope_m": {"rms": 0.5, "p95": 1.0},
+            "localizer_m": {"rms": 1.2, "p95": 4.0},
+            "glide_slope_to_flare_m": {"rms": 0.25, "p95": 0.75},
+        },
         "navigation": navigation,
         "consistency": {"early": {"nees9_mean": 9.1, "nees15_mean": nan, "frames": np.int64(600)}},
         "wall_time_s": 0.5,

@@ -97,10 +97,11 @@ def _motion(log: dict[str, Array]) -> None:
     log["command_roll_deg"] = log["body_roll_deg"] + 0.5 * np.sin(2.0 * t) * decay
     log["true_airspeed_mps"] = log["true_velocity_x_mps"].copy()
     log["pitot_airspeed_mps"] = log["true_airspeed_mps"] + 0.3 * np.sin(37.0 * t)
-    log["command_airspeed_mps"] = np.where(log["phase"] < 2, 40.0, 36.0)
+    log["command_airspeed_mps"] = np.where(log["phase"] == 1, 40.0, math.nan)
     log["elevator_deg"] = -3.0 + 0.5 * np.sin(t)
     log["aileron_deg"] = np.cos(t) * decay
     log["rudder_deg"] = 0.5 * np.sin(t / 2.0) * decay
+    log["tilt_reading_deg"] = log["tilt_deg"].copy()
     log["true_along_m"] = log["body_x_m"] + 1.0
     log["true_cross_m"] = log["body_y_m"].copy()
     log["true_height_m"] = log["body_height_m"] + 0.1
@@ -203,4 +204,6 @@ def parts() -> tuple[Any, Any]:
         right_wheel_body_m=(-0.2794, 0.762, 0.8382),
         sink_limit_mps=3.0,
     )
-    return scenario, SimpleNamespace(name="pioneer", gear=gear)
+    aircraft = SimpleNamespace(name="pioneer", gear=gear)
+    scenario.aircraft_config = aircraft
+    return scenario, aircraft

@@ -1,7 +1,9 @@
 """The command line: exit codes, one line on stderr, and what is and is not written."""
 
+import io
 import json
 import os
+import signal
 import subprocess
 import sys
 import tomllib
@@ -11,11 +13,12 @@ from typing import Any
 
 import pytest
 from conftest import fake_flight
+from rich.console import Console
 
 from landsim import __version__, cli
 from landsim.config import load_scenario
-from landsim.runs import read_run
-from landsim.tables import number
+from landsim.runs import as_json, read_run
+from landsim.tables import flight_tables, number
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 Run = Callable[..., tuple[int, str, str]]
@@ -75,13 +78,16 @@ class TestRun:
     def test_table_shows_the_metrics(self, landsim: Run) -> None:
         out = landsim("run", "landing")[1]
         lines = {line.split("  ")[0].strip(): line for line in out.splitlines()}
-        assert "landing, seed 0: landed, not in the box" in out
-        assert "265.2 m   100 … 450 m    ok" in lines["past the threshold"]
-        assert "1.25 m/s       ≤ 1 m/s   out" in lines["sink rate"]
+        assert out.splitlines()[:2] == ["runs/001-landing", "landing, seed 0: landed, not in the box"]
+        assert "265.2 m  100 … 450 m   ok" in lines["past the threshold"]
+        assert "± 2 m" in lines["right of the centreline"]
+        assert "1.25 m/s      ≤ 1 m/s  out" in lines["sink rate"]
         assert "–" in lines["heading error"]
-        assert "0.250 m" in lines["along"]
-        assert "1.50 m" in lines["along"]
+        assert lines["along, m"].split() == ["along,", "m", "0.250", "0.500", "1.50", "3.00", "0.125", "0.750"]
+        assert "640 to 645 frames that have both" in out
         assert "1.20 m" in lines["off the centreline"]
+        tracking = [line.split("  ")[0].strip() for line in out.splitlines() if line.startswith(" off the")]
+        assert tracking == ["off the glide slope", "off the glide slope, to the flare", "off the centreline"]
         assert max(map(len, out.splitlines())) <= 100
 
     def test_nothing_but_text_when_piped(self, landsim: Run) -> None:
@@ -101,7 +107,28 @@ class TestRun:
         landsim("run", "landing", "--out", "first", "--set", "runway.width_m=45")
         assert landsim("run", "first/scenario.toml", "--out", "second")[0] == 0
         first, second = ((tmp_path / name / "scenario.toml").read_text() for name in ("first", "second"))
-        assert first.split("\n", 1)[1] == second.split("\n", 1)[1]
+        assert first.split("\n", 2)[2] == second.split("\n", 2)[2]
+
+    def test_a_run_is_flown_again_from_its_folder(self, landsim: Run, tmp_path: Path, no_flying: list[int]) -> None:
+        landsim("run", "landing", "--seed", "7", "--out", "first", "--set", "runway.width_m=45")
+        assert landsim("run", "first")[0] == 0
+        assert landsim("run", "first", "--seed", "8", "--set", "runway.width_m=40")[0] == 0
+        assert no_flying == [7, 7, 8]
+        again, other = (read_run(tmp_path / "runs" / name) for name in ("001-landing", "002-landing"))
+        assert again.scenario.runway.width_m == 45.0
+        assert other.scenario.runway.width_m == 40.0
+        texts = [(tmp_path / name / "scenario.toml").read_text() for name in ("first", "runs/001-landing")]
+        assert texts[0] == texts[1]
+
+    def test_a_name_with_a_newline_stays_on_its_line(self, landsim: Run, tmp_path: Path) -> None:
+        (tmp_path / "x\ny.toml").write_text('kind = "flight"\naircraft.name = "pioneer"\n')
+        code, out, _ = landsim("run", "x\ny.toml", "--out", "a\nb")
+        assert code == 0
+        assert out.startswith("a\\nb\nx\\ny, seed 0: ")
+        assert "  a\\nb/log.parquet\n" in out
+        assert landsim("run", "a\nb", "--out", "again")[0] == 0
+        assert read_run(tmp_path / "again").scenario.name == "x\ny"
+        assert landsim("check", "x\ny.toml")[1].startswith("# x\\ny: ")
 
     def test_a_flight_that_went_wrong_is_kept(
         self, landsim: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -132,6 +159,11 @@ BAD = {
     "zero focal length": ["run", "landing", "--set", "camera.focal_length_mm=0.0"],
     "unknown aircraft": ["run", "landing", "--set", "aircraft.name=pionier"],
     "a study": ["run", "landing", "--set", "kind=study"],
+    "out is not text": ["run", "landing", "--out", "\udcff/a"],
+    "no name": ["check", ""],
+    "empty key": ["check", "landing", "--set", "..=3"],
+    "setting is not text": ["check", "landing", "--set", "\udcff=3"],
+    "seed is a word": ["run", "landing", "--seed", "x"],
     "not a setting": ["run", "landing", "--set", "width"],
     "negative seed": ["run", "landing", "--seed", "-1"],
     "fractional seed": ["run", "landing", "--seed", "1.5"],
@@ -154,9 +186,14 @@ TOLD = {
     "not a number": "override start.height_m: must be a finite number, not nan",
     "zero focal length": "override camera.focal_length_mm: must be above 0, not 0.0",
     "unknown aircraft": "override aircraft.name: no aircraft \"pionier\": neither a folder nor a shipped name; did you",
-    "a study": 'kind: must be "flight" to be run, not "study"',
-    "negative seed": "'--seed': -1",
-    "fractional seed": "'--seed': '1.5'",
+    "a study": 'kind: must be "flight" to be run, not "study": studies are not built in this version',
+    "negative seed": "'--seed': must be a whole number, 0 or more, not -1",
+    "fractional seed": "'--seed': must be a whole number, 0 or more, not 1.5",
+    "seed is a word": "'--seed': must be a whole number, 0 or more, not x",
+    "out is not text": "must be UTF-8 text",
+    "no name": "no scenario named",
+    "empty key": "the key has an empty part",
+    "setting is not text": "must be UTF-8 text",
     "folder below a file": "file/x/y: cannot be written",
     "folder is a file": "file: is a file",
     "folder is not empty": "full: is not empty",
@@ -224,6 +261,130 @@ class TestFailures:
         assert (code, out, err.strip()) == (130, "", "")
         assert list(tmp_path.iterdir()) == []
 
+    @pytest.mark.parametrize("command", ["check", "run"])
+    def test_a_model_that_jsbsim_refuses(
+        self, command: str, landsim: Run, aircraft_copy: Callable[[str], Path], no_flying: list[int]
+    ) -> None:
+        for path in (aircraft_copy("engb") / "Engines").glob("*.xml"):
+            path.write_text("<broken")
+        code, out, err = landsim(command, "landing", "--set", "aircraft.name=./engb")
+        assert (code, out, len(err.splitlines()), no_flying) == (2, "", 1, [])
+        assert "JSBSim refuses it" in err
+
+    def test_a_working_directory_that_is_gone(self, landsim: Run, tmp_path: Path) -> None:
+        (tmp_path / "gone").mkdir()
+        os.chdir(tmp_path / "gone")
+        (tmp_path / "gone").rmdir()
+        code, out, err = landsim("run", "landing", "--out", str(tmp_path / "run"))
+        assert (code, out, len(err.splitlines())) == (2, "", 1)
+        assert "the working directory is not there any more" in err
+
+    def test_plot_of_other_metrics(self, landsim: Run, tmp_path: Path) -> None:
+        landsim("run", "landing", "--out", "mine")
+        (tmp_path / "mine/metrics.json").write_text('{"scenario": "x"}')
+        code, _, err = landsim("plot", "mine")
+        assert (code, err) == (2, "landsim: mine: is not a run: metrics.json: seed is missing\n")
+
+    def test_sigterm_interrupts_and_leaves_nothing(
+        self, landsim: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def fly(scenario: Any, seed: int) -> None:
+            os.kill(os.getpid(), signal.SIGTERM)
+            raise AssertionError("it went on")
+
+        monkeypatch.setattr(sys.modules["landsim.simulate"], "fly", fly)
+        assert landsim("run", "landing")[0] == 130
+        assert list(tmp_path.iterdir()) == []
+        assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+
+
+class TestOutput:
+    """What becomes of a run that is kept when nobody can read of it."""
+
+    CODE = (
+        "import sys, types\nfrom pathlib import Path\nsys.path.insert(0, {tests!r})\nfrom conftest import fake_flight\n"
+        "simulate = types.ModuleType('landsim.simulate')\nsimulate.fly = lambda scenario, seed: fake_flight()\n"
+        "sys.modules['landsim.simulate'] = simulate\nfrom landsim.cli import main\n"
+        "main(['run', 'landing', '--no-plots', '--out', 'run'])\n"
+    ).format(tests=str(REPOSITORY / "tests"))
+
+    def shell(self, line: str, cwd: Path, **environment: str) -> tuple[int, bytes, bytes]:
+        """A line of bash, in which $RUN is a run."""
+        done = subprocess.run(
+            ["bash", "-o", "pipefail", "-c", line.replace("$RUN", f'{sys.executable} -c "$CODE"')],
+            cwd=cwd,
+            env=os.environ | {"PYTHONPATH": str(REPOSITORY), "CODE": self.CODE} | environment,
+            capture_output=True,
+            timeout=60,
+            check=False,
+        )
+        assert files(cwd) == {f"run/{name}" for name in RUN_FILES - {"profile.png"}}
+        return done.returncode, done.stdout, done.stderr
+
+    def test_a_reader_who_has_gone(self, tmp_path: Path) -> None:
+        assert self.shell("$RUN | head -1", tmp_path) == (0, b"run\n", b"")
+
+    def test_a_full_disk(self, tmp_path: Path) -> None:
+        code, _, err = self.shell("$RUN > /dev/full", tmp_path)
+        assert (code, len(err.splitlines())) == (0, 1)
+        assert err.startswith(b"landsim: run: the run is there; ")
+
+    @pytest.mark.parametrize("line", ["$RUN >&-", "$RUN >&- 2>&-", "$RUN >/dev/full 2>/dev/full"])
+    def test_nowhere_to_write(self, line: str, tmp_path: Path) -> None:
+        assert self.shell(line, tmp_path) == (0, b"", b"")
+
+    def test_a_terminal_of_ascii(self, tmp_path: Path) -> None:
+        code, out, err = self.shell("$RUN", tmp_path, PYTHONIOENCODING="ascii")
+        assert (code, err) == (0, b"")
+        assert b"265.2 m" in out
+        assert out.isascii()
+
+
+class TestTables:
+    def printed(self, width: int, metrics: dict[str, Any]) -> str:
+        console = Console(width=width, file=io.StringIO())
+        with console.capture() as text:
+            for table in flight_tables(metrics, width):
+                console.print(table, crop=False)
+        return text.get()
+
+    @pytest.mark.parametrize("width", [100, 60, 44, 40])
+    def test_nothing_is_cut_at_any_width(self, width: int) -> None:
+        metrics = as_json(fake_flight().metrics)
+        for figures in metrics["navigation"].values():
+            for of in figures.values():
+                of |= {"rms": 12345.6, "paired_rms": 77.25}
+        text = self.printed(width, metrics)
+        assert "…" not in text.replace(" … ", "")
+        for word in ("265.2 m", "100 … 450 m", "ok", "out", "± 2 m", "≤ 1 m/s", "12345.6", "vision", "threshold"):
+            assert word in text
+        words = " ".join(text.split())
+        assert "77.25" in text
+        assert "640 to 645 frames that have both" in words
+        assert max(map(len, text.splitlines())) <= width
+
+
+class TestPythonM:
+    def test_landsim(self, tmp_path: Path) -> None:
+        code = (
+            "import runpy, sys\nsys.argv = ['landsim', '--version']\nrunpy.run_module('landsim', run_name='__main__')"
+        )
+        assert process(cwd=tmp_path, code=code)[:2] == (0, f"landsim, version {__version__}\n")
+
+    @pytest.mark.parametrize("arguments", [["nosuch"], ["--help"], ["pioneer", "pioneer"]])
+    def test_modes_of_no_aircraft(self, arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+        from landsim import modes
+
+        assert modes.main(arguments) == 2
+        printed = capsys.readouterr()
+        assert (printed.out, len(printed.err.splitlines())) == ("", 1)
+
+    def test_modes(self, capsys: pytest.CaptureFixture[str]) -> None:
+        from landsim import modes
+
+        assert modes.main(["pioneer"]) == 0
+        assert "| phugoid |" in capsys.readouterr().out
+
 
 class TestOtherCommands:
     def test_list(self, landsim: Run) -> None:
@@ -277,9 +438,10 @@ class TestImports:
     def test_the_package_itself_is_light(self, tmp_path: Path) -> None:
         assert not HEAVY & self.imported("import landsim", tmp_path)
 
-    def test_check_does_not_wait_for_the_simulation(self, tmp_path: Path) -> None:
+    def test_check_loads_the_model_without_the_filter_and_pictures(self, tmp_path: Path) -> None:
         imported = self.imported("from landsim.cli import main; main(['check', 'landing'])", tmp_path)
-        assert not imported & {"numpy", "jsbsim", "filterpy", "matplotlib", "pyarrow"}
+        assert not imported & {"filterpy", "matplotlib", "pyarrow", "scipy"}
+        assert "jsbsim" in imported
 
     def test_the_controller_cannot_see_the_truth(self, tmp_path: Path) -> None:
         imported = self.imported("import landsim.guidance, landsim.navigation", tmp_path)

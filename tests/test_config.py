@@ -237,12 +237,12 @@ def _finite(low: float, high: float) -> st.SearchStrategy[float]:
 
 
 VALUES: dict[str, st.SearchStrategy[object]] = {
-    "runway.width_m": _finite(1e-300, 1e300),
+    "runway.width_m": _finite(2.0, 1000.0),
     "runway.heading_deg": st.integers(-360, 360),
     "approach.glide_slope_deg": _finite(0.001, 14.9),
-    "start.along_m": _finite(-1e9, -1e-9),
+    "start.along_m": _finite(-1e5, -1e-9),
     "start.speed_mps": st.none() | _finite(1.0, 100.0),
-    "camera.width_px": st.integers(16, 10**6),
+    "camera.width_px": st.integers(16, 20000),
     "camera.line_noise": st.sampled_from(["edge-points", "endpoints"]),
     "camera.outages_s": st.lists(_finite(0.0, 99.0), unique=True, max_size=6).map(
         lambda times: [list(pair) for pair in zip(sorted(times)[::2], sorted(times)[1::2], strict=False)]
@@ -342,10 +342,39 @@ class TestSettings:
         assert parsed == (key, value)
         assert type(parsed[1]) is type(value)
 
-    @pytest.mark.parametrize("text", ["", "a", "a=", "=1", "a=[1", 'a="b', "a={b"])
+    @pytest.mark.parametrize(
+        "text", ["", "a", "a=", "=1", "a=[1", 'a="b', "a={b", "..=3", "a..b=3", ".a=3", "a.=3", "\udcff=3", "a=\udcff"]
+    )
     def test_anything_else_is_refused(self, text: str) -> None:
         with pytest.raises(ScenarioError, match=r"^setting "):
             parse_setting(text)
+
+
+@pytest.mark.parametrize("key", [1, None, "", ".", "runway..width_m", "runway.", "\udcff"])
+def test_an_override_that_is_no_dotted_key_is_refused(key: Any) -> None:
+    with pytest.raises(ScenarioError, match=r"landing\.toml: override .*: must be a dotted key") as caught:
+        load_scenario("landing", {key: 2})
+    assert len(str(caught.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("key", "told"),
+    [
+        ("name", "unknown key; did you mean aircraft.name?"),
+        ("rate_hz", "unknown key; did you mean camera.rate_hz, imu.rate_hz or simulation.rate_hz?"),
+        ("camera.heading_deg", "unknown key; did you mean runway.heading_deg or start.heading_deg?"),
+    ],
+)
+def test_a_key_in_the_wrong_table_is_told_where_it_is(key: str, told: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario("landing", {key: 1})
+    assert str(caught.value).endswith(f"override {key}: {told}")
+
+
+@pytest.mark.parametrize("name", ["", " ", "x" * 300, "~nobody-of-that-name/x"])
+def test_what_names_no_file_is_refused(name: str) -> None:
+    with pytest.raises(ScenarioError, match=r"no scenario named|cannot be read"):
+        load_scenario(name)
 
 
 def test_a_users_file_wins_over_a_shipped_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

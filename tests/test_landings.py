@@ -14,6 +14,8 @@ What each case verifies:
 =========================================  ==========================================================================
 """
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -37,8 +39,9 @@ def fly(seed: int = 0, **overrides: object) -> Flight:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("line_noise", ["edge-points", "endpoints"])
-def test_landings(line_noise: str) -> None:
+def test_landings(line_noise: str, record_property: Callable[[str, object], None]) -> None:
     nees: dict[str, list[float]] = {phase: [] for phase in PHASES}
+    nees15: dict[str, list[float]] = {phase: [] for phase in PHASES}
     for seed in range(SEEDS):
         flight = fly(seed, camera__line_noise=line_noise)
         metrics = flight.metrics
@@ -55,9 +58,15 @@ def test_landings(line_noise: str) -> None:
         first_main = np.flatnonzero((log["wow_left"] > 0) | (log["wow_right"] > 0))[0]
         assert first_main < np.flatnonzero(log["wow_nose"] > 0)[0], where
         for quantity, vision in metrics["navigation"]["vision"].items():
-            assert metrics["navigation"]["fused"][quantity]["rms"] < vision["rms"], f"{where}: {quantity}"
+            fused = metrics["navigation"]["fused"][quantity]
+            assert fused["paired_rms"] < vision["paired_rms"], f"{where}: {quantity}"
+            assert fused["rms"] < vision["rms"], f"{where}: {quantity}"
         for phase in PHASES:
             nees[phase].append(metrics["consistency"][phase]["nees9_mean"])
+            nees15[phase].append(metrics["consistency"][phase]["nees15_mean"])
+    for phase, values in nees.items():
+        means = float(np.mean(values)), float(np.mean(nees15[phase]))
+        record_property(f"NEES of 9 and of 15 states, {line_noise}, {phase}", "{:.2f} {:.2f}".format(*means))
     for phase, values in nees.items():
         assert np.mean(values) == pytest.approx(9.0, rel=0.15), f"{line_noise}, {phase}: {np.mean(values):.2f}"
 

@@ -8,13 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from estimator.so3 import from_euler, matmul, rotate, rotate_back, to_euler
 from landsim import earth
+from landsim.config import ImuConfig
 from landsim.errors import InputError
 from landsim.plant import Plant, PlantError, TrimError, load, node
 from landsim.resources import find_aircraft
 from landsim.runway import Runway
+from landsim.sensors import Imu, site_of
 from landsim.state import Command
 from landsim.truth import InitialState, Truth
 from landsim.units import DEG, FT, STANDARD_GRAVITY
@@ -139,6 +142,32 @@ def test_velocity_is_the_rate_of_position(runway: Runway) -> None:
     for before, now, after in zip(flown, flown[1:], flown[2:], strict=False):
         moved = [0.5 * RATE * (b - a) for a, b in zip(before.position, after.position, strict=True)]
         assert moved == pytest.approx(now.velocity, abs=1e-4)
+
+
+@pytest.mark.parametrize("runway", RUNWAYS)
+def test_ideal_imu_reports_what_jsbsim_feels(runway: Runway) -> None:
+    """Without errors the unit's increments are JSBSim's own accelerometers and inertial rates, in the middle of a
+    step."""
+    plant, truth = started(runway, START._replace(position=(-1000.0, 5.0, -300.0)))
+    truth = fly(plant, truth, 1.0, weave)[-1]
+    nothing = dict.fromkeys((key for key in ImuConfig.model_fields if key != "rate_hz"), 0.0)
+    imu = Imu(ImuConfig.model_validate(nothing), site_of(runway), truth, default_rng(0))
+
+    def felt() -> list[float]:
+        forces = [
+            STANDARD_GRAVITY * sign * read(plant, f"accelerations/N{axis}")
+            for axis, sign in zip("xyz", (1, 1, -1), strict=True)
+        ]
+        return forces + [read(plant, f"velocities/{axis}i-rad_sec") for axis in "pqr"]
+
+    before = felt()
+    for _ in range(40):
+        sample = imu.sample(plant.step())
+        after = felt()
+        middle = [0.5 * (a + b) for a, b in zip(before, after, strict=True)]
+        assert [v * RATE for v in sample.velocity] == pytest.approx(middle[:3], abs=0.05)
+        assert [a * RATE for a in sample.angle] == pytest.approx(middle[3:], abs=2e-3)
+        before = after
 
 
 @pytest.mark.parametrize("runway", RUNWAYS)

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import matplotlib as mpl
@@ -22,15 +23,15 @@ Array = NDArray[np.float64]
 SCENARIO, AIRCRAFT = parts()
 FIGURES: dict[str, Callable[[Log, dict[str, Any]], Figure]] = {
     "profile and plan": lambda log, metrics: plots.profile_and_plan(log, SCENARIO, metrics),
-    "navigation errors": plots.navigation_errors,
-    "attitude and controls": plots.controls_and_attitude,
+    "navigation errors": lambda log, metrics: plots.navigation_errors(log, SCENARIO, metrics),
+    "attitude and controls": lambda log, metrics: plots.controls_and_attitude(log, SCENARIO, metrics),
     "what the camera saw": lambda log, metrics: plots.camera_views(log, SCENARIO, metrics),
     "consistency": lambda log, metrics: plots.consistency(log, SCENARIO, metrics),
 }
 PANELS = {
     "profile and plan": 3,
     "navigation errors": 8,
-    "attitude and controls": 8,
+    "attitude and controls": 10,
     "what the camera saw": 12,
     "consistency": 4,
 }
@@ -140,9 +141,14 @@ def test_profile_shows_the_log_against_the_slope_and_the_box(flight: dict[str, A
     figure = plots.profile_and_plan(flight, SCENARIO, metrics)
     side, plan, flare = figure.axes
     x, height = line(side, "true")
-    np.testing.assert_allclose(height, np.interp(x, flight["true_along_m"], flight["true_height_m"]), atol=1e-9)
+    np.testing.assert_allclose(height, np.interp(x, flight["body_x_m"], flight["body_height_m"]), atol=1e-9)
+    x, height = line(side, "fused")  # at the cg too: a metre behind and 0.1 m below the camera
+    shown = set(np.round(x[np.isfinite(x)], 6))
+    assert shown
+    assert shown <= set(np.round(flight["fused_along_m"] - 1.0, 6))
+    assert set(np.round(height[np.isfinite(height)], 6)) <= set(np.round(flight["fused_height_m"] - 0.1, 6))
     x, height = line(side, "3° glide slope")
-    # 1144 m before the aim point (the camera is a metre ahead of the start) the 3° line is 1144 tan 3° up
+    # so many metres before the aim point the 3° line is so many times tan 3° up
     assert (x[1], height[1]) == (145.0, 0.0)
     assert height[0] == pytest.approx((145.0 - x[0]) * 0.0524077793)
     bottom, top = plan.get_ylim()
@@ -153,10 +159,12 @@ def test_profile_shows_the_log_against_the_slope_and_the_box(flight: dict[str, A
 
 
 def test_errors_are_estimate_less_truth_in_a_band_of_three_sigma(flight: dict[str, Array]) -> None:
-    figure = plots.navigation_errors(flight, measured(flight))
+    figure = plots.navigation_errors(flight, SCENARIO, measured(flight))
     axes = next(a for a in figure.axes if a.get_ylabel() == "cross error, m")
-    time, shown = line(axes, "fused")
-    expected = np.interp(time, flight["time_s"], flight["fused_cross_m"] - flight["true_cross_m"])
+    time, shown = line(axes, "fused, at camera frames")
+    frames = np.isfinite(flight["nees9"])
+    np.testing.assert_array_equal(time, flight["time_s"][frames])
+    expected = (flight["fused_cross_m"] - flight["true_cross_m"])[frames]
     np.testing.assert_allclose(shown, expected, atol=1e-12)
     band = next(c for c in axes.collections if "3 σ" in str(c.get_label())).get_paths()[0].vertices
     vertices = np.asarray(band)
@@ -182,8 +190,8 @@ def test_six_moments_in_order(flight: dict[str, Array]) -> None:
     figure = plots.camera_views(flight, SCENARIO, measured(flight))
     images = [axes for axes in figure.axes if "px" in axes.get_xlabel()]
     titles = [axes.get_title(loc="left") for axes in images]
-    starts = ["first lines", "600 m to go", "200 m to go", "last before hand-over", "flare", "rollout"]
-    assert [title.split(":")[0] for title in titles] == starts
+    starts = ["first lines", "600 m to go", "200 m to go", "last before hand-over", "wheels", "on the ground"]
+    assert [title.split(":")[0] if "wheels" not in title else "wheels" for title in titles] == starts
     assert all("three lines" in title for title in titles[:4])
     assert all("two lines" in title for title in titles[4:])
     for axes in images:
@@ -194,7 +202,7 @@ def test_six_moments_in_order(flight: dict[str, Array]) -> None:
 
 
 def test_six_moments_also_of_half_a_flight(flight: dict[str, Array]) -> None:
-    half = {name: values[:1200] for name, values in flight.items()}  # to 600 m before the threshold
+    half = {name: values[:1150] for name, values in flight.items()}  # to 618 m before the threshold
     figure = plots.camera_views(half, SCENARIO, measured(half, "timeout"))
     titles = [axes.get_title(loc="left") for axes in figure.axes if "px" in axes.get_xlabel()]
     assert [title.split(":")[0] for title in titles] == ["first lines", *["on the way"] * 4, "last lines"]
@@ -204,13 +212,15 @@ def test_six_moments_also_of_half_a_flight(flight: dict[str, Array]) -> None:
 
 def test_a_landing_outside_the_box_says_by_what(flight: dict[str, Array]) -> None:
     log = flight | {"body_y_m": flight["body_y_m"] + 2.0}
-    head = text_of(plots.navigation_errors(log, measured(log)))
+    head = text_of(plots.navigation_errors(log, SCENARIO, measured(log)))
     assert "landed, outside the box: misses cross_max_m = 2 with 2.17" in head  # 0.17 m before
     assert "stop_cross" not in head
 
 
 def test_the_end_of_all_lines_is_marked(flight: dict[str, Array]) -> None:
-    log = flight | {"stage": np.where(flight["time_s"] > 12.0, 0.0, flight["stage"])}
+    log = dict(flight)
+    for name in (f"{of}_seen_{end}" for of in ("left", "threshold", "right") for end in ("u0", "v0", "u1", "v1")):
+        log[name] = np.where(flight["time_s"] > 12.0, np.nan, flight[name])
     marks = {name: when for when, name in style.event_times(log, measured(log))}
     assert marks == {"no more lines": 12.0, "touchdown": flight["time_s"][_touch(flight)]}
 
@@ -246,4 +256,125 @@ def test_a_long_log_is_thinned_and_keeps_its_ends() -> None:
 
 
 def test_zero_has_no_sign() -> None:
-    assert [style.signed(value, 1) for value in (-0.04, 0.04, -0.06, 1.25)] == ["0.0", "0.0", "-0.1", "+1.2"]
+    assert [style.signed(value, 1) for value in (-0.04, 0.04, -0.06, 1.25)] == ["0.0", "0.0", "−0.1", "+1.2"]
+
+
+def test_a_rejected_frame_is_told_by_what_was_seen(flight: dict[str, Array]) -> None:
+    """The stage of a frame that the gate refused is 0: no reason to say that it saw nothing, or less."""
+    frames = np.isfinite(flight["left_seen_u0"])
+    log = flight | {"stage": np.zeros_like(flight["stage"]), "accepted": np.where(frames, 0.0, np.nan)}
+    metrics = measured(log)
+    assert style.event_times(log, metrics) == style.event_times(flight, measured(flight))
+    images = [axes for axes in plots.camera_views(log, SCENARIO, metrics).axes if "px" in axes.get_xlabel()]
+    titles = [axes.get_title(loc="left").split("\n")[1] for axes in images]
+    assert titles == ["three lines, rejected"] * 4 + ["two lines, rejected"] * 2
+
+
+def test_offsets_have_one_scale(flight: dict[str, Array]) -> None:
+    figure = plots.camera_views(flight, SCENARIO, measured(flight))
+    assert len({axes.get_ylim() for axes in figure.axes if "px" not in axes.get_xlabel()}) == 1
+
+
+def test_a_distance_is_named_only_near_it(flight: dict[str, Array]) -> None:
+    log = dict(flight)
+    hidden = (flight["true_along_m"] > -650.0) & (flight["true_along_m"] < -530.0)
+    for name in log:
+        if "_seen_" in name:
+            log[name] = np.where(hidden, np.nan, flight[name])
+    figure = plots.camera_views(log, SCENARIO, measured(log))
+    titles = "".join(axes.get_title(loc="left") for axes in figure.axes)
+    assert "600 m to go" not in titles
+    assert "200 m to go" in titles
+
+
+@pytest.mark.parametrize(("width", "height"), [(658, 16), (16, 658)])
+def test_an_extreme_image_keeps_the_layout(width: int, height: int, flight: dict[str, Array]) -> None:
+    camera = SCENARIO.camera.model_copy(update={"width_px": width, "height_px": height})
+    scenario = SimpleNamespace(**{**vars(SCENARIO), "camera": camera})
+    figure = plots.camera_views(flight, scenario, measured(flight))  # type: ignore[arg-type]
+    figure.draw_without_rendering()
+    for axes in (axes for axes in figure.axes if "px" in axes.get_xlabel()):
+        box = axes.get_window_extent()
+        assert 0.29 < box.height / box.width < 0.81
+        assert axes.get_xlabel() == "not to scale; u, px"
+
+
+def test_the_legend_of_the_consistency_holds_all_panels() -> None:
+    """NIS in too few frames for a mean, errors in enough."""
+    log = empty_log(400)
+    log["nees9"][::4], log["nees15"][::4] = 9.0, 15.0
+    log["nis"][:40:4], log["nis_dof"][:40:4] = 6.0, 6.0
+    figure = plots.consistency(log, SCENARIO, measured(log, "timeout"))
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names == ["each frame", "mean of 30 frames", "expected", "95 % of the frames", "gate"]
+
+
+def test_names_of_marks_stay_inside_and_apart() -> None:
+    figure = Figure(figsize=(4.0, 3.0))
+    axes = figure.add_axes((0.2, 0.2, 0.7, 0.5))
+    axes.set_xlim(0.0, 100.0)
+    assert style.mark(axes, [(1.0, "no more lines"), (50.0, "touchdown"), (50.5, "crash"), (200.0, "beyond")]) == 2
+    figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert [text.get_text() for text in axes.texts] == ["no more lines", "touchdown", "crash"]
+    panel = axes.get_window_extent()
+    for i, box in enumerate(boxes):
+        assert panel.x0 <= box.x0 < box.x1 <= panel.x1
+        assert box.y0 >= panel.y1  # above the panel: over no data
+        assert not any(box.overlaps(other) for other in boxes[i + 1 :])
+
+
+def test_a_filter_that_never_started_is_told() -> None:
+    log = empty_log(400)
+    log["vision_along_m"][:12:4] = -900.0
+    figure = plots.navigation_errors(log, SCENARIO, measured(log, "timeout"))
+    assert "navigation never started: 3 usable frames" in text_of(figure)
+    assert [style.never_started(n) for n in (0, 1)] == [
+        f"navigation never started: {n}" for n in ("0 usable frames", "1 usable frame")
+    ]
+
+
+def test_the_airspeed_command_is_that_of_the_approach(flight: dict[str, Array]) -> None:
+    log = flight | {"command_airspeed_mps": np.full(flight["time_s"].size, 40.0)}
+    figure = plots.controls_and_attitude(log, SCENARIO, measured(log))
+    axes = next(a for a in figure.axes if a.get_ylabel() == "airspeed, m/s")
+    time, shown = line(axes, "command")
+    phase = np.interp(time, flight["time_s"], flight["phase"])
+    np.testing.assert_array_equal(np.isfinite(shown), phase == 1.0)
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert [name.split()[-1] for name in names] == ["acquire", "approach", "flare", "rollout", "stopped"]
+
+
+def test_a_crash_is_marked_and_ends_the_pictures(flight: dict[str, Array]) -> None:
+    touch = _touch(flight)
+    log = flight | {"wow_nose": np.where(np.arange(flight["time_s"].size) >= touch - 1, 1.0, 0.0)}
+    metrics = measured(log)
+    failed = style.failure(log, SCENARIO, metrics)
+    assert failed == style.Failure(touch - 1, "crash", True)
+    time = float(flight["time_s"][touch - 1])
+    shown = style.until_shortly_after(log, failed)["time_s"]
+    assert shown[-1] == pytest.approx(time + 3.0, abs=0.01)
+    assert (time, "crash") in style.event_times(log, metrics, failed)
+    for draw in FIGURES.values():
+        draw(log, metrics).draw_without_rendering()
+    side = plots.profile_and_plan(log, SCENARIO, metrics).axes[0]
+    assert "crash" in [text.get_text() for text in side.texts]
+    assert side.get_xlim()[1] < 500.0  # it stops beyond
+
+
+def test_a_flight_off_the_runway_is_marked_there(flight: dict[str, Array]) -> None:
+    touch = _touch(flight)
+    beside = np.where(np.arange(flight["time_s"].size) >= touch + 100, 15.5, 0.0)
+    log = flight | {"body_y_m": flight["body_y_m"] + beside}
+    assert style.failure(log, SCENARIO, measured(log)) == style.Failure(touch + 100, "off the runway", True)
+    assert style.failure(flight, SCENARIO, measured(flight)) is None
+
+
+def test_no_flight_no_picture(tmp_path: Path) -> None:
+    log = empty_log(0)
+    assert report.draw_run(tmp_path, SCENARIO, log, measured(log, "trim_failed")) == []
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_minus_signs_are_those_of_the_axes() -> None:
+    assert [style.signed(-1.26, 1), style.number(-106.6, ".0f"), style.number(2.0)] == ["−1.3", "−107", "2"]

@@ -3,15 +3,19 @@
 import json
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Barrier
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from conftest import FakeFlight, fake_flight
 
 from landsim.config import load_scenario
-from landsim.errors import RunFolderError
-from landsim.runs import as_json, new_run, read_run, write_run
+from landsim.errors import RunFolderError, ScenarioError
+from landsim.log import load_log
+from landsim.runs import as_json, load_flight, new_run, read_run, write_run
 
 
 def tree(folder: Path) -> list[str]:
@@ -155,12 +159,124 @@ class TestReadBack:
         with pytest.raises(RunFolderError, match=f"run: is not a run: {name} is missing"):
             read_run(folder)
 
-    @pytest.mark.parametrize("text", ["{", "[]", "{}", "3"])
+    @pytest.mark.parametrize("text", ["{", "[]", "{}", "3", '{"scenario": "x"}', "[" * 100000])
     def test_other_metrics_are_refused(self, text: str) -> None:
         folder = self.write(fake_flight())
         (folder / "metrics.json").write_text(text)
-        with pytest.raises(RunFolderError, match=r"metrics\.json: cannot be read"):
+        with pytest.raises(RunFolderError, match=r"^run: is not a run: metrics\.json"):
             read_run(folder)
+
+    @pytest.mark.parametrize(
+        ("change", "told"),
+        [
+            ({"seed": -1}, "seed must be at least 0, not -1"),
+            ({"seed": True}, "seed must be a whole number, not true"),
+            ({"touchdown": {"x_m": 1.0}}, "touchdown.time_s is missing"),
+            ({"scenario": "../up"}, 'scenario cannot be a name: "../up"'),
+            ({"scenario": ""}, 'scenario cannot be a name: ""'),
+        ],
+    )
+    def test_metrics_of_another_shape_are_refused(self, change: dict[str, Any], told: str) -> None:
+        folder = self.write(fake_flight())
+        metrics = json.loads((folder / "metrics.json").read_text()) | change
+        (folder / "metrics.json").write_text(json.dumps(metrics))
+        for read in (read_run, lambda path: load_flight(str(path))):
+            with pytest.raises(RunFolderError) as caught:
+                read(folder)
+            assert str(caught.value) == f"run: is not a run: metrics.json: {told}"
+
+    def test_a_log_without_a_column_is_refused(self) -> None:
+        folder = self.write(fake_flight())
+        pq.write_table(pq.read_table(folder / "log.parquet").drop_columns(["phase"]), folder / "log.parquet")
+        with pytest.raises(RunFolderError, match=r"^run: is not a run: log\.parquet: column phase is missing$"):
+            read_run(folder)
+
+    def test_a_column_of_words_is_refused(self) -> None:
+        folder = self.write(fake_flight())
+        pq.write_table(pa.table({"time_s": ["a"]}), folder / "log.parquet")
+        with pytest.raises(RunFolderError, match=r"^run: is not a run: log\.parquet: "):
+            read_run(folder)
+
+    def test_the_scenarios_first_lines_say_what_was_flown(self) -> None:
+        text = (self.write(fake_flight("landing", 7)) / "scenario.toml").read_text()
+        first, second, third = text.splitlines()[:3]
+        assert first.startswith("# landing, seed 7")
+        assert "landsim run DIR" in second
+        assert "landsim run scenario.toml --seed 7" in second
+        assert not third.startswith("#")
+
+
+class TestReserved:
+    def test_a_name_is_taken_from_the_start(self, tmp_path: Path) -> None:
+        with new_run("landing", Path("a/run")) as place:
+            with (
+                pytest.raises(RunFolderError, match=r"a/run: is being written by another run"),
+                new_run("landing", Path("a/run")),
+            ):
+                pytest.fail("it was let in")
+            (place.temporary / "file").write_text("x")
+        assert tree(tmp_path) == ["a", "a/run", "a/run/file"]
+
+    def test_one_of_many_gets_it(self, tmp_path: Path) -> None:
+        together = Barrier(8)
+
+        def one(_: int) -> bool:
+            together.wait()
+            try:
+                with new_run("landing", Path("run")) as place:
+                    (place.temporary / "file").write_text("x")
+            except RunFolderError:
+                return False
+            return True
+
+        with ThreadPoolExecutor(8) as pool:
+            assert sum(pool.map(one, range(8))) == 1
+        assert tree(tmp_path) == ["run", "run/file"]
+
+    def test_a_path_that_is_not_text_is_refused(self, tmp_path: Path) -> None:
+        with pytest.raises(RunFolderError, match="must be UTF-8 text"), new_run("landing", Path("\udcff/a")):
+            pytest.fail("it was let in")
+        assert tree(tmp_path) == []
+
+
+class TestLoadFlight:
+    def run(self, folder: str) -> None:
+        Path(folder).mkdir()
+        write_run(Path(folder), load_scenario("landing", {"runway.width_m": 45.0}), fake_flight("mine", 7))
+
+    def test_a_runs_folder_gives_name_seed_and_scenario(self) -> None:
+        self.run("flown")
+        scenario, seed = load_flight("flown", {"camera.rate_hz": 15.0})
+        assert (scenario.name, seed, scenario.runway.width_m, scenario.camera.rate_hz) == ("mine", 7, 45.0, 15.0)
+
+    def test_a_shipped_name_wins_over_a_folder(self) -> None:
+        self.run("landing")
+        assert load_flight("landing")[1] is None
+        assert load_flight("./landing")[1] == 7
+
+    def test_another_folder_is_refused(self) -> None:
+        Path("empty").mkdir()
+        with pytest.raises(RunFolderError, match=r"^empty: is not a run: scenario\.toml is missing$"):
+            load_flight("empty")
+
+    @pytest.mark.parametrize("name", ["", "nowhere", "x" * 300, "~nobody-of-that-name/x"])
+    def test_what_is_not_there_is_no_scenario(self, name: str) -> None:
+        with pytest.raises(ScenarioError):
+            load_flight(name)
+
+    def test_the_same_flight_again_bit_for_bit(self) -> None:
+        from landsim.simulate import fly  # takes a second to import
+
+        scenario = load_scenario("landing", {"simulation.time_limit_s": 3.0})
+        folder = Path("flown")
+        folder.mkdir()
+        write_run(folder, scenario, fly(scenario, seed=5))
+        again, seed = load_flight("flown")
+        assert seed == 5
+        flight = fly(again, seed)
+        assert flight.metrics["scenario"] == "landing"
+        first = load_log(folder / "log.parquet")
+        assert all(first[name].tobytes() == column.tobytes() for name, column in flight.log.items())
 
 
 def test_as_json() -> None:

@@ -207,11 +207,11 @@ def test_imu_reports_its_errors_as_the_filter_defines_them() -> None:
 
 def test_pitot_lags_and_is_noisy() -> None:
     before, after = truth_at(airspeed=30.0), truth_at(airspeed=40.0)
-    tube = Pitot(PitotConfig.model_validate({"noise_mps": 0.0, "lag_s": 0.5}), 0.01, before, 60, default_rng(0))
+    tube = Pitot(PitotConfig.model_validate({"noise_mps": 0.0, "lag_s": 0.5}), 0.01, before, default_rng(0))
     readings = [tube.sample(after) for _ in range(50)]
     assert readings[-1] == pytest.approx(30.0 + 10.0 * (1.0 - math.exp(-1.0)), abs=1e-6)
     assert all(a < b for a, b in pairwise(readings))
-    noisy = Pitot(PitotConfig.model_validate({"noise_mps": 0.3}), 0.01, after, 5000, default_rng(1))
+    noisy = Pitot(PitotConfig.model_validate({"noise_mps": 0.3}), 0.01, after, default_rng(1))
     values = np.array([noisy.sample(after) for _ in range(5000)])
     assert values.mean() == pytest.approx(40.0, abs=0.02)
     assert values.std() == pytest.approx(0.3, rel=0.05)
@@ -219,7 +219,7 @@ def test_pitot_lags_and_is_noisy() -> None:
 
 def test_mount_turns_at_its_rate_and_is_read_with_its_error() -> None:
     config = MountConfig(position_body_m=LEVER, tilt_rate_deg_s=10.0, tilt_reading_sigma_deg=0.005)
-    mount = TiltMount(config, 0.1, 3000, default_rng(0))
+    mount = TiltMount(config, 0.1, default_rng(0))
     angles = []
     for _ in range(12):
         mount.move(math.radians(10.0))

@@ -1,12 +1,13 @@
 """What was commanded and what came of it."""
 
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from landsim.metrics import Log
@@ -15,32 +16,50 @@ from landsim.plots.style import (
     BLUE,
     COMMAND,
     FUSED,
-    PALE,
+    GREY,
     SKY,
     STYLE,
     TRUE,
     VERMILION,
+    failure,
     legend_above,
     legend_in_head,
     new_figure,
     span,
     thinned,
+    until_shortly_after,
 )
 from landsim.state import Phase
 
-PHASE_SHADES = {Phase.ACQUIRE: "#f0f0f0", Phase.FLARE: "#dceaf5", Phase.ROLLOUT: "#f7ead2"}
+if TYPE_CHECKING:
+    from landsim.config import Scenario
+
+PHASE_SHADES = {
+    Phase.ACQUIRE: "#cfcfcf",
+    Phase.APPROACH: "#ffffff",
+    Phase.FLARE: "#dceaf5",
+    Phase.ROLLOUT: "#f7ead2",
+    Phase.STOPPED: "#e3d2ae",
+}
+CRASH: dict[str, Any] = {"color": VERMILION, "lw": 1.0, "ls": "-."}
 
 
 @rc_context(STYLE)
-def controls_and_attitude(log: Log, metrics: dict[str, Any]) -> Figure:
-    """What was commanded, what came of it, and what the controls did, over time."""
-    figure = new_figure((10.0, 9.2), "attitude and controls", metrics)
-    grid = figure.add_gridspec(4, 2, left=0.08, right=0.985, top=0.885, bottom=0.055, hspace=0.3, wspace=0.21)
+def controls_and_attitude(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -> Figure:
+    """What was commanded, what came of it, and what the controls did, over time.
+
+    The airspeed command is shown in the approach: from the flare on the throttle is at idle and nothing follows it.
+    """
+    figure = new_figure((10.0, 9.8), "attitude and controls", metrics)
+    grid = figure.add_gridspec(5, 2, left=0.09, right=0.985, top=0.885, bottom=0.05, hspace=0.36, wspace=0.26)
+    failed = failure(log, scenario, metrics)
+    log = until_shortly_after(log, failed)
     few = thinned(log)
+    few["command_airspeed_mps"] = np.where(few["phase"] == Phase.APPROACH, few["command_airspeed_mps"], np.nan)
     rows: list[tuple[str, list[tuple[str, dict[str, Any]]]]] = [
         ("pitch, °", [("body_pitch_deg", TRUE), ("command_pitch_deg", COMMAND)]),
         ("bank, °", [("body_roll_deg", TRUE), ("command_roll_deg", COMMAND)]),
-        ("heading to the runway, °", [("body_yaw_deg", TRUE)]),
+        ("heading relative\nto the runway, °", [("body_yaw_deg", TRUE)]),
         (
             "airspeed, m/s",
             [
@@ -49,25 +68,33 @@ def controls_and_attitude(log: Log, metrics: dict[str, Any]) -> Figure:
                 ("command_airspeed_mps", COMMAND),
             ],
         ),
-        ("control surfaces, °", _lines("elevator_deg", "aileron_deg", "rudder_deg")),
-        ("share of full (1)", _lines("throttle", "brake", "steering")),
-        ("camera tilt, ° down", [("tilt_deg", TRUE)]),
         ("sink rate, m/s", [("true_velocity_z_mps", TRUE), ("fused_velocity_z_mps", FUSED)]),
+        ("control surfaces, °", _lines("elevator_deg", "aileron_deg", "rudder_deg")),
+        ("share of full (1)", _lines("throttle", "brake")),
+        ("steering, right (1)", [("steering", TRUE)]),
+        ("camera tilt, ° down", [("tilt_deg", TRUE)]),
+        ("weight on wheel (1)", _lines("wow_nose", "wow_left", "wow_right")),
     ]
     for i, (label, curves) in enumerate(rows):
-        axes = figure.add_subplot(grid[i % 4, i // 4])
+        axes = figure.add_subplot(grid[i % 5, i // 5])
         for name, style in curves:
             axes.plot(few["time_s"], few[name], **style)
         axes.set_ylabel(label)
         axes.set_xlim(*span(log["time_s"], (0.0, 1.0)))
         axes.margins(y=0.08)
         _shade_phases(axes, log)
-        axes.yaxis.set_label_coords(-0.115, 0.5)
+        if failed is not None:
+            axes.axvline(log["time_s"][failed.row], **CRASH)
+        axes.yaxis.set_label_coords(-0.125, 0.5)
         legend_above(axes)
-        if i % 4 == 3:
+        if i % 5 == 4:
             axes.set_xlabel("time, s")
-    shades = [Rectangle((0.0, 0.0), 1.0, 1.0, fc=shade, ec=PALE, lw=0.6) for shade in PHASE_SHADES.values()]
-    legend_in_head(figure, shades, [phase.name.lower() for phase in PHASE_SHADES])
+    handles: list[Any] = [Rectangle((0, 0), 1, 1, fc=shade, ec=GREY, lw=0.6) for shade in PHASE_SHADES.values()]
+    names = [f"{'by guidance: ' if phase is Phase.ACQUIRE else ''}{phase.name.lower()}" for phase in PHASE_SHADES]
+    if failed is not None:
+        handles.append(Line2D([], [], **CRASH))
+        names.append(failed.name)
+    legend_in_head(figure, handles, names)
     return figure
 
 
@@ -77,17 +104,19 @@ def _lines(*names: str) -> list[tuple[str, dict[str, Any]]]:
         {"color": VERMILION, "lw": 1.2, "ls": (0, (4, 2))},
         {"color": BLUE, "lw": 1.2, "ls": (0, (1.5, 1.2))},
     )
-    return [(name, {**style, "label": name.removesuffix("_deg")}) for name, style in zip(names, styles, strict=True)]
+    return [
+        (name, {**style, "label": name.removesuffix("_deg").removeprefix("wow_")})
+        for name, style in zip(names, styles, strict=False)
+    ]
 
 
 def _shade_phases(axes: Axes, log: Log) -> None:
-    """The phases of guidance as shades; the approach has none."""
+    """The phases of guidance as shades; the approach is white."""
     time, phase = log["time_s"], log["phase"]
     if time.size < 2:
         return
     cuts = [0, *(np.flatnonzero(np.diff(phase)) + 1).tolist(), time.size]
     for begin, end in pairwise(cuts):
         kind = Phase(int(phase[begin]))
-        span = float(time[begin]), float(time[min(end, time.size - 1)])
-        if kind in PHASE_SHADES:
-            axes.axvspan(*span, color=PHASE_SHADES[kind], lw=0.0, zorder=0.1)
+        during = float(time[begin]), float(time[min(end, time.size - 1)])
+        axes.axvspan(*during, color=PHASE_SHADES[kind], lw=0.0, zorder=0.1)

@@ -22,13 +22,19 @@ from landsim.plots.style import (
     VISION,
     distance_axis,
     event_times,
+    failure,
+    foot_of_head,
     largest,
     legend_in_head,
     mark,
+    never_started,
     new_figure,
     note,
+    number,
     span,
     thinned,
+    until_shortly_after,
+    usable_frames,
 )
 
 if TYPE_CHECKING:
@@ -36,49 +42,55 @@ if TYPE_CHECKING:
 
 
 @rc_context(STYLE)
-def navigation_errors(log: Log, metrics: dict[str, Any]) -> Figure:
+def navigation_errors(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -> Figure:
     """Errors of vision and of the filter in all six quantities, with the filter's ± 3 σ, over time.
 
     Vision errs many times more than the filter, and both shrink by as much on the way: the scale is that of square
     roots, so that all of it can be read.
     """
-    figure = new_figure((10.0, 9.2), "navigation errors of the camera's pose, on axes of square roots", metrics)
-    grid = figure.add_gridspec(3, 2, left=0.085, right=0.985, top=0.85, bottom=0.06, hspace=0.3, wspace=0.24)
-    few = thinned(log)
-    marks = event_times(log, metrics)
+    figure = new_figure((10.0, 9.6), "navigation errors of the camera's pose, on axes of square roots", metrics)
+    grid = figure.add_gridspec(3, 2, left=0.1, right=0.985, top=0.818, bottom=0.055, hspace=0.34, wspace=0.3)
+    failed = failure(log, scenario, metrics)
+    log = until_shortly_after(log, failed)
+    few, frames = thinned(log), np.isfinite(log["nees9"])
+    marks = event_times(log, metrics, failed)
+    unstarted = usable_frames(log)
     for i, quantity in enumerate(QUANTITIES):
         axes = figure.add_subplot(grid[i % 3, i // 3])
         name, unit = quantity.rsplit("_", 1)
         sigma = few[f"sigma_{quantity}"]
-        axes.plot(log["time_s"], error(log, "vision", quantity), **VISION)
+        vision, fused = error(log, "vision", quantity), error(log, "fused", quantity)[frames]
+        axes.plot(log["time_s"], vision, **VISION)
         axes.fill_between(
             few["time_s"], -3.0 * sigma, 3.0 * sigma, color=SKY, alpha=0.35, lw=0.0, label="± 3 σ of the filter"
         )
-        fused = error(few, "fused", quantity)
-        axes.plot(few["time_s"], fused, color=BLUE, lw=1.2, label="fused")
-        _root_scale(axes, error(log, "vision", quantity), fused, 3.0 * sigma)
+        axes.plot(log["time_s"][frames], fused, color=BLUE, lw=0.5, label="fused, at camera frames", zorder=2.5)
+        nothing = "no estimate" if unstarted is None else never_started(unstarted)
+        _root_scale(axes, nothing, vision, fused, 3.0 * sigma)
         axes.set_ylabel(f"{name} error, {'°' if unit == 'deg' else unit}")
         axes.set_xlim(*span(log["time_s"], (0.0, 1.0)))
-        mark(axes, marks)
+        levels = mark(axes, marks)
         if i % 3 == 0:
-            distance_axis(axes, log)
+            distance_axis(axes, log, levels)
         if i % 3 == 2:
             axes.set_xlabel("time, s")
-        axes.yaxis.set_label_coords(-0.125, 0.5)
+        axes.yaxis.set_label_coords(-0.17, 0.5)
         if i == 0:
             legend_in_head(figure, *axes.get_legend_handles_labels())
+    words = "the times below and the distances above hold for the whole column"
+    foot_of_head(figure, words if unstarted is None else f"{words}\n{never_started(unstarted)}")
     return figure
 
 
-def _root_scale(axes: Axes, *values: Array) -> None:
+def _root_scale(axes: Axes, nothing: str, *values: Array) -> None:
     """A symmetric y axis of signed square roots, with a few round numbers on it; it holds 99.5 % of each array.
 
-    Without a number to show it says so.
+    Without a number to show it says ``nothing``.
     """
     finite = [np.abs(v[np.isfinite(v)]) for v in values]
     top = 1.15 * max((float(np.quantile(v, 0.995)) for v in finite if v.size), default=0.0)
     if top <= 0.0:
-        note(axes, "no estimate")
+        note(axes, nothing)
         axes.set_yticks([])
         return
     axes.set_yscale("function", functions=(signed_root, signed_square))
@@ -86,7 +98,7 @@ def _root_scale(axes: Axes, *values: Array) -> None:
     for _ in range(2):
         ticks.append(round_below(ticks[-1] / 3.9))
     axes.yaxis.set_major_locator(FixedLocator([-tick for tick in ticks] + [0.0] + ticks))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}".replace("-", "−")))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
     axes.set_ylim(-top, top)
 
 
@@ -113,9 +125,11 @@ def consistency(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -> Figu
     The nine states are position, velocity and attitude; the fifteen have both biases besides.
     """
     figure = new_figure(
-        (10.0, 8.0), "consistency of the filter: normalised errors (NEES) and innovations (NIS), squared", metrics
+        (10.0, 8.6), "consistency of the filter: normalised errors (NEES) and innovations (NIS), squared", metrics
     )
-    grid = figure.add_gridspec(3, 1, left=0.075, right=0.985, top=0.83, bottom=0.065, hspace=0.2)
+    grid = figure.add_gridspec(3, 1, left=0.075, right=0.985, top=0.775, bottom=0.065, hspace=0.36)
+    failed = failure(log, scenario, metrics)
+    log = until_shortly_after(log, failed)
     time = log["time_s"]
     ones = np.ones(time.size)
     gates = np.select(
@@ -128,7 +142,9 @@ def consistency(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -> Figu
         ("nees15", "NEES, 15 states (1)", 15.0 * ones, None),
         ("nis", "NIS (1)", log["nis_dof"], gates),
     )
-    marks = event_times(log, metrics)
+    marks = event_times(log, metrics, failed)
+    unstarted = usable_frames(log)
+    handles: dict[str, Any] = {}
     for i, (name, label, dof, gate) in enumerate(panels):
         axes = figure.add_subplot(grid[i])
         rows = np.flatnonzero(np.isfinite(log[name]) & np.isfinite(dof) & (log[name] > 0.0))
@@ -148,13 +164,18 @@ def consistency(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -> Figu
         axes.yaxis.set_minor_locator(NullLocator())
         axes.set_ylabel(label)
         axes.set_xlim(*span(time, (0.0, 1.0)))
-        mark(axes, marks)
+        levels = mark(axes, marks)
         if i == 0:
-            distance_axis(axes, log)
-        if rows.size:
+            distance_axis(axes, log, levels)
+        for handle, of in zip(*axes.get_legend_handles_labels(), strict=True):
+            handles.setdefault(of, handle)
+        if not rows.size:
+            note(axes, "no frame" if unstarted is None else never_started(unstarted))
+            axes.set_yticks([])
+        else:
             axes.set_ylim(
                 0.4 * chdtri(float(n.min()), 0.975), 1.6 * max(largest(values), chdtri(float(n.max()), 0.025))
             )
     axes.set_xlabel("time, s")
-    legend_in_head(figure, *axes.get_legend_handles_labels())
+    legend_in_head(figure, list(handles.values()), list(handles))
     return figure

@@ -1,15 +1,20 @@
 """Colours, line styles and the parts that several pictures share."""
 
 import math
+import re
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from landsim.metrics import Array, Log
-from landsim.state import Stage
+from landsim.log import LINES
+from landsim.metrics import CRASHES, Array, Log, find_touchdown, main_wheels
+
+if TYPE_CHECKING:
+    from landsim.config import Scenario
 
 BLACK, GREY, PALE = "#000000", "#7f7f7f", "#d9d9d9"
 BLUE, SKY, ORANGE, VERMILION, GREEN = "#0072B2", "#56B4E9", "#E69F00", "#D55E00", "#009E73"
@@ -43,16 +48,32 @@ STYLE: Any = {
 }
 POINTS = 1500
 """A line in a picture needs no more."""
+AFTERMATH_S = 3.0
+"""A picture goes on for as long after a crash or after leaving the runway, s."""
+LABEL_PT = 8.0
+"""Size of the names of vertical marks."""
+LEVEL_PT = 9.5
+"""From one row of such names to the next."""
+
+
+class Failure(NamedTuple):
+    """What failed a flight at its wheels."""
+
+    row: int
+    """Of the log."""
+    name: str
+    sliding: bool
+    """Not on the wheels, or not on the runway: what follows is no flight."""
 
 
 def new_figure(size: tuple[float, float], what: str, metrics: dict[str, Any]) -> Figure:
     """An empty figure with its headline: what it shows, of which flight, and how that ended."""
     figure = Figure(figsize=size)
     inch = 1.0 / size[1]
-    figure.text(
-        0.012, 1.0 - 0.12 * inch, f"{metrics['scenario']}, seed {metrics['seed']}: {what}", va="top", fontsize=13.0
-    )
-    figure.text(0.012, 1.0 - 0.44 * inch, _how_it_ended(metrics), va="top", fontsize=9.5, color="#404040")
+    headline, ending = f"{metrics['scenario']}, seed {metrics['seed']}: {what}", _how_it_ended(metrics)
+    for text, below, font, colour in ((headline, 0.12, 13.0, BLACK), (ending, 0.44, 9.5, "#404040")):
+        room = 72.0 * 0.97 * size[0] / (0.56 * max(len(text), 1))  # a letter is about half as wide as its size
+        figure.text(0.012, 1.0 - below * inch, text, va="top", fontsize=min(font, room), color=colour)
     return figure
 
 
@@ -63,45 +84,128 @@ def _how_it_ended(metrics: dict[str, Any]) -> str:
         outcome += ", in the box"
     elif outcome == "landed":
         missed = [
-            f"{name} = {limit['limit']:g} with {limit['value']:.2f}"
+            f"{name} = {number(limit['limit'])} with {number(limit['value'], '.2f')}"
             for name, limit in metrics["box"].items()
             if not limit["ok"]
         ]
         return f"{outcome}, outside the box: misses {', '.join(missed)}"
-    return f"{outcome}: {metrics['reason']}"
+    return re.sub(r"(?<![\w.])-(?=\d)", "−", f"{outcome}: {metrics['reason']}")
 
 
-def event_times(log: Log, metrics: dict[str, Any]) -> list[tuple[float, str]]:
-    """Hand-over, touchdown and the loss of all lines, by when they were."""
-    time, stage = log["time_s"], log["stage"]
+def failure(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -> Failure | None:
+    """Where a flight that crashed or left the runway did so; None for any other flight."""
+    if metrics["outcome"] not in {"crashed", "off_runway"} or not log["time_s"].size:
+        return None
+    aircraft, runway = scenario.aircraft_config, scenario.runway
+    touchdown = find_touchdown(log, aircraft)
+    found = []
+    nose = np.flatnonzero(log["wow_nose"] > 0.0)
+    if nose.size and (touchdown is None or nose[0] <= touchdown.row):
+        found.append(Failure(int(nose[0]), "crash", True))
+    if metrics["end"] in CRASHES:
+        found.append(Failure(log["time_s"].size - 1, "crash", True))
+    if touchdown is not None:
+        if touchdown.sink_rate > aircraft.gear.sink_limit_mps:
+            found.append(Failure(touchdown.row, "crash", False))
+        x, y = (values[touchdown.row :] for values in main_wheels(log, aircraft))
+        off = np.flatnonzero((x < 0.0) | (x > runway.length_m) | (np.abs(y) > 0.5 * runway.width_m))
+        if off.size:
+            found.append(Failure(touchdown.row + int(off[0]), "off the runway", True))
+    return min(found, key=lambda one: one.row, default=None)
+
+
+def until_shortly_after(log: Log, failed: Failure | None) -> Log:
+    """The log without what is no flight any more."""
+    if failed is None or not failed.sliding:
+        return log
+    last = int(np.searchsorted(log["time_s"], log["time_s"][failed.row] + AFTERMATH_S, side="right"))
+    return {name: values[:last] for name, values in log.items()}
+
+
+def lines_seen(log: Log) -> dict[str, NDArray[np.bool_]]:
+    """Whether each line was seen, a row each; False between frames."""
+    return {line: np.isfinite(log[f"{line}_seen_u0"]) for line in LINES}
+
+
+def handed_over(log: Log) -> int | None:
+    """The first row with both edges and no threshold, after the last with all three; None if there is none."""
+    seen = lines_seen(log)
+    edges = seen["left"] & seen["right"]
+    all_three = np.flatnonzero(edges & seen["threshold"])
+    two = np.flatnonzero(edges & ~seen["threshold"])
+    two = two[two > (all_three[-1] if all_three.size else -1)]
+    return int(two[0]) if two.size else None
+
+
+def event_times(log: Log, metrics: dict[str, Any], failed: Failure | None = None) -> list[tuple[float, str]]:
+    """Hand-over from three lines to two, touchdown, the loss of all lines and a crash, by when they were."""
+    time = log["time_s"]
     marks = []
-    late = np.flatnonzero(stage == Stage.LATE)
-    if late.size:
-        marks.append((float(time[late[0]]), "two lines"))
+    late = handed_over(log)
+    if late is not None:
+        marks.append((float(time[late]), "two lines"))
     if metrics["touchdown"] is not None:
         marks.append((metrics["touchdown"]["time_s"], "touchdown"))
-    seen = np.flatnonzero(stage != Stage.NONE)
+    seen = np.flatnonzero(np.any(list(lines_seen(log).values()), axis=0))
     if seen.size and time[-1] - time[seen[-1]] > 1.0:
         marks.append((float(time[seen[-1]]), "no more lines"))
+    if failed is not None:
+        marks.append((float(time[failed.row]), failed.name))
     return marks
 
 
-def mark(axes: Axes, marks: Iterable[tuple[float, str]]) -> None:
-    """Vertical lines with their names along them, at the top."""
-    for where, name in marks:
+def usable_frames(log: Log) -> int | None:
+    """If navigation never started, in how many frames the lines gave a whole pose; None if it did."""
+    if np.isfinite(log["fused_along_m"]).any():
+        return None
+    return int(np.isfinite(log["vision_along_m"]).sum())
+
+
+def never_started(frames: int) -> str:
+    """What there is to say of such a flight."""
+    return f"navigation never started: {frames} usable frame{'' if frames == 1 else 's'}"
+
+
+def mark(axes: Axes, marks: Iterable[tuple[float, str]]) -> int:
+    """Vertical lines with their names above the panel, where they hide nothing; returns how many rows of names.
+
+    The limits along must be final: a name is kept within them, and a row up where it would meet another.
+    """
+    low, high = axes.get_xlim()
+    width_pt, _ = _size_pt(axes)
+    free: list[float] = []
+    for where, name in sorted(marks):
+        if not low <= where <= high:
+            continue
         axes.axvline(where, color=GREY, lw=0.9, zorder=1.0)
+        half = 0.5 * 0.58 * LABEL_PT * len(name) + 2.0
+        at = (where - low) / (high - low) * width_pt
+        middle = min(max(at, half), max(width_pt - half, half))
+        level = next((i for i, end in enumerate(free) if middle - half >= end), len(free))
+        free[level : level + 1] = [middle + half]
         axes.annotate(
-            name, (where, 0.97), xycoords=axes.get_xaxis_transform(), xytext=(-2.0, 0.0), textcoords="offset points",
-            rotation=90.0, ha="right", va="top", fontsize=8.0, color="#404040",
-            bbox={"fc": "white", "ec": "none", "alpha": 0.7, "pad": 0.6}, zorder=1.8,
+            name, (where, 1.0), xycoords=axes.get_xaxis_transform(), xytext=(middle - at, 2.0 + LEVEL_PT * level),
+            textcoords="offset points", ha="center", va="bottom", fontsize=LABEL_PT, color="#404040",
+            bbox={"fc": "white", "ec": "none", "pad": 0.4}, annotation_clip=False,
         )  # fmt: skip
+    return len(free)
 
 
-def legend_above(axes: Axes, **how: Any) -> None:
-    """A legend in one line above the panel, at its right, where it hides nothing."""
+def _size_pt(axes: Axes) -> tuple[float, float]:
+    """Width and height of a panel, points."""
+    figure, place = axes.get_figure(root=True), axes.get_position()
+    if figure is None:
+        raise ValueError("the panel is in no figure")
+    return 72.0 * place.width * figure.get_figwidth(), 72.0 * place.height * figure.get_figheight()
+
+
+def legend_above(axes: Axes, levels: int = 0, **how: Any) -> None:
+    """A legend in one line above the panel and the names of its marks, at its right, where it hides nothing."""
     handles, labels = axes.get_legend_handles_labels()
     if len(handles) > 1:
-        axes.legend(handles, labels, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(handles), **how)
+        _, height_pt = _size_pt(axes)
+        base = 1.0 + LEVEL_PT * levels / height_pt
+        axes.legend(handles, labels, loc="lower right", bbox_to_anchor=(1.0, base), ncols=len(handles), **how)
 
 
 def legend_in_head(figure: Figure, handles: list[Any], labels: list[str], **how: Any) -> None:
@@ -110,15 +214,29 @@ def legend_in_head(figure: Figure, handles: list[Any], labels: list[str], **how:
     figure.legend(handles, labels, loc="upper left", bbox_to_anchor=(0.008, top), ncols=len(handles), **how)
 
 
+def foot_of_head(figure: Figure, text: str) -> None:
+    """A few words on all panels, at the right of the line with the legend."""
+    top = 1.0 - 0.76 / float(figure.get_figheight())
+    figure.text(0.985, top, text, ha="right", va="top", fontsize=8.5, color="#404040")
+
+
 def note(axes: Axes, text: str) -> None:
     """A few words in the middle of a panel."""
-    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", color="#404040")
+    axes.text(
+        0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", color="#404040",
+        bbox={"fc": "white", "ec": "none", "pad": 2.0},
+    )  # fmt: skip
+
+
+def number(value: float, how: str = "g") -> str:
+    """A number in a text, with the minus sign of the axes."""
+    return f"{value:{how}}".replace("-", "−")
 
 
 def signed(value: float, digits: int) -> str:
     """A number with its sign, but zero without one."""
     text = f"{value:+.{digits}f}"
-    return text[1:] if float(text) == 0.0 else text
+    return text[1:] if float(text) == 0.0 else text.replace("-", "−")
 
 
 def thinned(log: Log) -> dict[str, Array]:
@@ -143,8 +261,8 @@ def largest(values: Array) -> float:
     return float(finite.max()) if finite.size else 0.0
 
 
-def distance_axis(axes: Axes, log: Log) -> None:
-    """Ticks above the panel where the camera passes round distances from the threshold."""
+def distance_axis(axes: Axes, log: Log, levels: int) -> None:
+    """Ticks above the panel, and above the names of its marks, where the camera passes round distances."""
     along, time = log["true_along_m"], log["time_s"]
     if along.size < 2:
         return
@@ -155,7 +273,8 @@ def distance_axis(axes: Axes, log: Log) -> None:
     top = axes.twiny()
     top.grid(visible=False)
     top.set_xlim(axes.get_xlim())
-    top.set_xticks(np.interp(ticks, passed, time), [f"{tick:g}".replace("-", "−") for tick in ticks])
+    top.set_xticks(np.interp(ticks, passed, time), [number(tick) for tick in ticks])
     top.tick_params(length=2.5, pad=1.0)
     top.spines["top"].set_visible(True)
-    top.set_xlabel("along the runway from the threshold, m", fontsize=8.5, labelpad=3.0)
+    top.spines["top"].set_position(("outward", 3.0 + LEVEL_PT * levels))
+    top.set_xlabel("camera along the runway from the threshold, m", fontsize=8.5, labelpad=3.0)
