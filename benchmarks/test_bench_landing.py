@@ -1,4 +1,7 @@
-"""A whole landing, as a ratio to JSBSim stepping the same aircraft and systems for as many steps alone."""
+"""A whole landing, as a ratio to JSBSim stepping the same aircraft and systems through the same landing alone.
+
+Alone means from the recorded inputs of its systems: nothing is read, no sensor, filter or guidance runs.
+"""
 
 import statistics
 import sys
@@ -6,33 +9,46 @@ import time
 from typing import Any
 
 import pytest
+from numpy.random import SeedSequence, default_rng
 
 import landsim
 from landsim.plant import Plant
-from landsim.simulate import runway_of
-from landsim.truth import InitialState
-from landsim.units import DEG
+from landsim.simulate import draw_start, runway_of
 
 ROUNDS = 7
-HIGH = 1500.0
-"""Height at which JSBSim flies alone, m: at its trimmed 3° down it meets no ground."""
 
 
 @pytest.mark.benchmark(group="landing")
 def test_landing(benchmark: Any, capsys: pytest.CaptureFixture[str]) -> None:
     scenario = landsim.load_scenario("landing")
     aircraft = scenario.aircraft_config
-    steps = len(landsim.fly(scenario, seed=0).log["time_s"]) - 1  # the first flight also warms everything up
+    inputs: list[tuple[str, tuple[Any, ...]]] = []
+    with pytest.MonkeyPatch.context() as patch:  # the first flight also warms everything up
+        for name in ("feed", "command"):
+            original = getattr(Plant, name)
+
+            def recorded(plant: Plant, *given: Any, name: str = name, original: Any = original) -> None:
+                inputs.append((name, given))
+                original(plant, *given)
+
+            patch.setattr(Plant, name, recorded)
+        landsim.fly(scenario, seed=0)
+    steps = sum(name == "feed" for name, _ in inputs)
+    start = draw_start(scenario, default_rng(SeedSequence(0).spawn(5)[0]))
     alone: list[float] = []
     landings: list[float] = []
 
     def fly_alone() -> None:
         plant = Plant(aircraft.folder, aircraft.model, runway_of(scenario), scenario.simulation.rate_hz)
-        plant.start(InitialState((-1000.0, 0.0, -HIGH), aircraft.speeds.approach_mps, 0.0, -3.0 * DEG))
-        run = plant._fdm.run
+        plant.start(start)
+        run, feed, command = plant._fdm.run, plant.feed, plant.command
         began = time.perf_counter()
-        for _ in range(steps):
-            run()
+        for name, given in inputs:
+            if name == "command":
+                command(*given)
+            else:
+                feed(*given)
+                run()
         alone.append(time.perf_counter() - began)
 
     def land() -> Any:

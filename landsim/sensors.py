@@ -5,7 +5,7 @@ do.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -142,18 +142,10 @@ class Imu:
         )  # fmt: skip
 
 
-class _Noise:
-    """White noise, drawn a block at a time."""
-
-    def __init__(self, sigma: float, rng: Generator) -> None:
-        self._sigma = sigma
-        self._rng = rng
-        self._drawn: list[float] = []
-
-    def next(self) -> float:
-        if not self._drawn:
-            self._drawn = (self._sigma * self._rng.standard_normal(BLOCK)).tolist()
-        return self._drawn.pop()
+def _white(sigma: float, rng: Generator) -> Iterator[float]:
+    """White noise without end, drawn a block at a time."""
+    while True:
+        yield from (sigma * rng.standard_normal(BLOCK)).tolist()
 
 
 class Pitot:
@@ -171,14 +163,14 @@ class Pitot:
     """
 
     def __init__(self, config: PitotConfig, dt: float, start: Truth, rng: Generator) -> None:
-        self._noise = _Noise(config.noise_mps, rng)
+        self._noise = _white(config.noise_mps, rng)
         self._gain = 1.0 if config.lag_s == 0.0 else 1.0 - math.exp(-dt / config.lag_s)
         self._lagged = start.airspeed
 
     def sample(self, truth: Truth) -> float:
         """Airspeed, m/s."""
         self._lagged += self._gain * (truth.airspeed - self._lagged)
-        return max(self._lagged + self._noise.next(), 0.0)
+        return max(self._lagged + next(self._noise), 0.0)
 
 
 class TiltMount:
@@ -200,15 +192,16 @@ class TiltMount:
     def __init__(self, config: MountConfig, dt: float, rng: Generator) -> None:
         self.tilt = config.tilt_early_deg * DEG
         self._step = config.tilt_rate_deg_s * DEG * dt
-        self._noise = _Noise(config.tilt_reading_sigma_deg * DEG, rng)
+        self._noise = _white(config.tilt_reading_sigma_deg * DEG, rng)
 
     def move(self, command: float) -> None:
         """Move toward an angle (rad) for one step."""
-        self.tilt += max(-self._step, min(self._step, command - self.tilt))
+        if command != self.tilt:
+            self.tilt += max(-self._step, min(self._step, command - self.tilt))
 
     def read(self) -> float:
         """The angle as read, rad."""
-        return self.tilt + self._noise.next()
+        return self.tilt + next(self._noise)
 
 
 class View(NamedTuple):
@@ -279,7 +272,7 @@ class LineCamera:
         if total == 0:
             return [None, None, None]
         # all lines at once: n_u, n_v, i n_u, i n_v, n_u², n_u n_v, n_v² of each point i, with its noise n in units of
-        # σ, # summed over the points of each line
+        # σ, summed over the points of each line
         noise = self._rng.standard_normal((2, total))
         terms = self._terms[:, :total]
         terms[:2] = noise
