@@ -15,12 +15,13 @@ What each case verifies:
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
 import landsim
-from landsim.config import load_scenario
+from landsim.config import ScenarioError, load_scenario
 from landsim.log import COLUMNS
 from landsim.metrics import find_touchdown
 from landsim.resources import shipped_scenarios
@@ -196,3 +197,32 @@ def test_touchdown_is_the_first_contact() -> None:
     assert touchdown is not None
     before = flight.log["wheel_height_m"][touchdown.row - 1]
     assert -0.02 < before < 0.02, "the wheels were at the ground the step before"
+
+
+def test_start_under_the_ground_is_named() -> None:
+    flight = fly(0, start__height_m=0.5, start__height_sigma_m=0.0)
+    assert flight.metrics["outcome"] == "trim_failed"
+    assert "under the ground" in flight.metrics["reason"]
+    assert flight.metrics["start"]["height_m"] == 0.5
+
+
+def test_a_failed_landing_is_soon_over() -> None:
+    """Three seconds after the wheel that should not have touched first."""
+    flight = fly(0, camera__outages_s=[[1.0, 1000.0]])
+    assert flight.metrics["outcome"] == "crashed"
+    touched = flight.log["time_s"][np.flatnonzero(flight.log["wow_nose"] > 0.0)[0]]
+    assert flight.metrics["flight_time_s"] == pytest.approx(touched + 3.0, abs=0.05)
+    assert "believed no frame" in flight.metrics["reason"]
+    assert np.nanmax(np.abs(flight.log["command_pitch_deg"])) <= 12.0
+
+
+@pytest.mark.parametrize("seed", [-1, True, None, 1.5, "x"])
+def test_seed_is_a_whole_number(seed: Any) -> None:
+    with pytest.raises(ValueError, match="seed must be a whole number"):
+        landsim.fly(load_scenario("landing"), seed=seed)
+
+
+@pytest.mark.parametrize(("imu", "camera"), [(40.0, 30.0), (30.0, 40.0), (20.0, 30.0)])
+def test_frames_between_samples_of_the_imu_are_refused(imu: float, camera: float) -> None:
+    with pytest.raises(ScenarioError, match=r"must divide imu\.rate_hz"):
+        load_scenario("landing", overrides={"imu.rate_hz": imu, "camera.rate_hz": camera})

@@ -104,3 +104,14 @@ def test_moments_of_floats_and_arrays_agree() -> None:
 def test_wrong_shapes(shape: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match=r"points must have the shape"):
         fit_line(np.zeros(shape))
+
+
+def test_points_that_coincide_have_no_direction_and_no_warning() -> None:
+    fit = fit_line([[[1.0, 2.0], [1.0, 2.0]], [[0.0, 0.0], [3.0, 4.0]]])
+    offset, angle = fit_variances(fit.spread, fit.points, 1.0)
+    assert offset == 0.5
+    assert angle[0] == math.inf
+    assert np.isfinite(angle[1])
+    covariance = fit.covariance(1.0)
+    assert not np.isfinite(covariance[0]).all()
+    assert np.isfinite(covariance[1]).all()
