@@ -174,7 +174,11 @@ def pose_innovation(
     # an error of the mount angle, one more residual, turns the camera about the body's y axis, which is its own x axis
     residual.append(0.0)
     variance.append(mount.tilt_variance)
-    J = np.array([(*row, turn) for row, turn in zip(rows, sway, strict=True)])
+    numbers: list[float] = []
+    for row, turn in zip(rows, sway, strict=True):
+        numbers += row
+        numbers.append(turn)
+    J = np.array(numbers).reshape(len(rows), -1)
     d, sigma2 = np.array((residual, variance))
     return Innovation(np.dot(J, d), H, np.dot(J * sigma2, J.T))
 

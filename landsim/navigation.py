@@ -34,7 +34,7 @@ class FrameResult(NamedTuple):
     update: Update
     stage: Stage
     roll: float
-    """Of the camera triad, as predicted: what the late stage borrows, rad; NaN before the filter has started."""
+    """Of the camera triad, as predicted: what the late stage borrows, rad; NaN where it borrows none."""
 
 
 class Navigator:
@@ -121,8 +121,10 @@ class Navigator:
         if self.filter is None:
             return self._align(lines, frame.tilt)
         self.filter.predict()
-        right, down, _ = camera_axes(self.filter.state.attitude, frame.tilt)
-        roll = math.atan2(right[2], down[2])
+        roll = NAN
+        if frame.threshold is None:
+            right, down, _ = camera_axes(self.filter.state.attitude, frame.tilt)
+            roll = math.atan2(right[2], down[2])
         update = self.filter.observe(lines, frame.tilt)
         if update.degrees > 0:
             self._rejected = 0 if update.accepted else self._rejected + 1

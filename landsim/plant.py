@@ -28,7 +28,7 @@ RUN_UP_S = 1.0
 """Time the engine runs, airframe held, before trim: JSBSim's search for a steady propeller diverges from standstill."""
 RUN_UP_THROTTLE = 0.3
 CONTACT_HEIGHT = 30.0
-"""m; above it no part of any aircraft can touch the ground, and the contacts are not asked."""
+"""m; above it no aircraft touches the ground or feels it: contacts are not asked, and the terrain is left as it is."""
 
 _INTEGRATORS = (
     "simulation/integrator/rate/rotational",
@@ -384,10 +384,10 @@ class Plant:
         x0, y0, z0 = self._origin
         down = r6 * x + r7 * y + r8 * z - z0
         cosine, R_runway_from_body = self._attitude(latitude, longitude, phi, theta, psi)
-        # here the ellipsoid's normal through the aircraft meets the runway's plane
-        self._set_terrain(altitude + down / (FT * cosine))
         nose = left = right = touching = False
         if down > -CONTACT_HEIGHT:
+            # here the ellipsoid's normal through the aircraft meets the runway's plane
+            self._set_terrain(altitude + down / (FT * cosine))
             nose, left, right = [read() != 0.0 for read in self._wheels]
             touching = any([read() != 0.0 for read in self._structure])  # noqa: C419 (a list is faster)
         return Truth(

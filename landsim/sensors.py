@@ -232,7 +232,6 @@ class LineCamera:
         self._rng = rng
         most = 3 * (int(math.hypot(config.width_px, config.height_px) / config.point_spacing_px) + 3)
         self._places = np.arange(most, dtype=float)
-        self._terms: Array = np.empty((7, most))
 
     def view(self, truth: Truth, tilt: float, tilt_reading: float) -> View:
         """The image at an instant, with the true and the read mount angle (rad)."""
@@ -273,9 +272,8 @@ class LineCamera:
             return [None, None, None]
         # all lines at once: n_u, n_v, i n_u, i n_v, n_u², n_u n_v, n_v² of each point i, with its noise n in units of
         # σ, summed over the points of each line
-        noise = self._rng.standard_normal((2, total))
-        terms = self._terms[:, :total]
-        terms[:2] = noise
+        terms: Array = np.empty((7, total))
+        noise = self._rng.standard_normal(out=terms[:2])
         np.multiply(noise, self._places[:total], out=terms[2:4])
         np.multiply(noise, noise[0], out=terms[4:6])
         np.multiply(noise[1], noise[1], out=terms[6])
