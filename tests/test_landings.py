@@ -68,6 +68,8 @@ def test_landings(line_noise: str, record_property: Callable[[str, object], None
     for phase, values in nees.items():
         means = float(np.mean(values)), float(np.mean(nees15[phase]))
         record_property(f"NEES of 9 and of 15 states, {line_noise}, {phase}", "{:.2f} {:.2f}".format(*means))
+    for phase in ("early", "late"):
+        assert np.mean(nees15[phase]) == pytest.approx(15.0, rel=0.15), f"{line_noise}, {phase}: all 15 states"
     for phase, values in nees.items():
         assert np.mean(values) == pytest.approx(9.0, rel=0.15), f"{line_noise}, {phase}: {np.mean(values):.2f}"
 

@@ -1,0 +1,67 @@
+"""What the loop knows and takes down, against the truth: vision poses, body rates, angle of attack."""
+
+import math
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+import landsim
+from estimator.alignment import Incidence
+from estimator.mount import Mount
+from estimator.so3 import IDENTITY
+from estimator.strapdown import Inertial, Site
+from landsim.config import CameraConfig, ImuConfig, NavigationConfig, load_aircraft
+from landsim.navigation import Navigator
+from landsim.sensors import camera_of, imu_noise
+from landsim.simulate import incidence_of
+from landsim.state import ImuSample
+
+
+def test_vision_of_perfect_lines_is_the_truth() -> None:
+    """Early to rounding; late but for the borrowed roll, of which an error δ costs (h + L²/(4 h)) δ across."""
+    log = landsim.fly(landsim.load_scenario("landing", overrides={"camera.noise_px": 0.0}), seed=0).log
+    early = np.isfinite(log["vision_along_m"])
+    late = np.isfinite(log["vision_cross_m"]) & ~early
+    assert early.sum() > 600
+    assert late.sum() > 600
+    for quantity in ("along_m", "cross_m", "height_m", "roll_deg", "pitch_deg", "yaw_deg"):
+        error = np.abs(log[f"vision_{quantity}"] - log[f"true_{quantity}"])
+        assert error[early].max() < 1e-6, quantity
+        if quantity in ("height_m", "pitch_deg", "yaw_deg"):
+            assert error[late].max() < 0.03, quantity
+    h = log["true_height_m"][late]
+    borrowed = np.radians(np.abs(log["fused_roll_deg"] - log["true_roll_deg"])[late])
+    across = np.abs(log["vision_cross_m"] - log["true_cross_m"])[late]
+    assert (across < 1.2 * (h + 225.0 / h) * borrowed + 0.01).all()
+
+
+def test_body_rate_is_less_bias_and_the_turning_earth() -> None:
+    aircraft = load_aircraft("pioneer")
+    site = Site(9.8, (1e-3, -2e-3, 3e-3), 6.4e6)
+    navigator = Navigator(
+        camera_of(CameraConfig()),
+        1.0,
+        30.0,
+        site,
+        imu_noise(ImuConfig()),
+        0.01,
+        Mount((0.0, 0.0, 0.0), 0.0),
+        NavigationConfig(),
+        incidence_of(aircraft),
+    )
+    still = Inertial((0.0, 0.0, -9.0), (0.0, 0.0, 0.0), IDENTITY)
+    running = SimpleNamespace(gyro_bias=(0.01, 0.02, -0.03), state=still, propagate=lambda *_: None)
+    navigator.filter = cast("Any", running)
+    navigator.propagate(ImuSample((0.001, 0.002, 0.003), (0.0, 0.0, 0.0)))
+    # 0.1, 0.2, 0.3 rad/s as measured
+    assert navigator.state(0.0).rate == pytest.approx((0.1 - 0.01 - 0.001, 0.2 - 0.02 + 0.002, 0.3 + 0.03 - 0.003))
+
+
+def test_incidence_follows_the_trim_table() -> None:
+    """By the published coefficients: 2.7° at 40 m/s, 4.6° at 36 m/s."""
+    incidence = incidence_of(load_aircraft("pioneer"))
+    assert isinstance(incidence, Incidence)
+    assert math.degrees(incidence.at(40.0)) == pytest.approx(2.72, abs=0.05)
+    assert math.degrees(incidence.at(36.0)) == pytest.approx(4.6, abs=0.1)
