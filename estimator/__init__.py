@@ -35,6 +35,7 @@ in a product the names that touch must match: ``R_cam_from_body @ R_body_from_ru
 Modules
 -------
 so3                 rotations on tuples of floats
+compiled            what runs at every step and frame; not imported from here, since numba takes half a second
 camera              pinhole camera: projection, clipping, the planes of image lines
 lines               total least squares through edge points, with the line's covariance
 three_line          early stage: pose from both edges and the threshold

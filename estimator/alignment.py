@@ -53,26 +53,28 @@ class Alignment:
     """
 
     def __init__(self, site: Site, frames: int, incidence: Incidence, speed_sigma: float) -> None:
-        self._site = site
+        self._site = site.numbers()
         self._frames = frames
         self._incidence = incidence
         self._speed_sigma = speed_sigma
-        self._state: Inertial | None = None
+        self._nominal: Array | None = None
         self._time = 0.0
         self._shifts: list[tuple[float, ...]] = []
 
-    def propagate(self, angle: Vec3, velocity: Vec3, dt: float) -> None:
-        """Carry the dead reckoning on by an interval of the inertial unit."""
-        if self._state is not None:
-            self._state, _ = strapdown.propagate(self._state, self._site, angle, velocity, dt)
+    def propagate(self, sample: Array, dt: float) -> None:
+        """Carry the dead reckoning on by an interval of the inertial unit, its sample as `advance` takes it."""
+        if self._nominal is not None:
+            self._nominal = strapdown.advance(self._nominal, _NO_BIAS, sample, self._site, dt)
             self._time += dt
 
     def add(self, pose: BodyPose, airspeed: float) -> bool:
         """Take in a vision pose; True once there are enough."""
-        if self._state is None:
-            self._state = Inertial(pose.position, self._velocity(pose.attitude, airspeed), pose.attitude)
-        p, q = pose.position, self._state.position
-        turn = log(matmul(pose.attitude, transpose(self._state.attitude)))
+        if self._nominal is None:
+            first = Inertial(pose.position, self._velocity(pose.attitude, airspeed), pose.attitude)
+            self._nominal = first.numbers()
+        reckoned = strapdown.inertial(self._nominal)
+        p, q = pose.position, reckoned.position
+        turn = log(matmul(pose.attitude, transpose(reckoned.attitude)))
         self._shifts.append((p[0] - q[0], p[1] - q[1], p[2] - q[2], *turn))
         return len(self._shifts) >= self._frames
 
@@ -82,11 +84,11 @@ class Alignment:
 
     def mean(self, airspeed: float) -> Inertial:
         """The dead-reckoned state, corrected by the mean of the poses."""
-        assert self._state is not None
+        assert self._nominal is not None
         shift = np.zeros(strapdown.STATES)
         mean = np.mean(self._shifts, axis=0)
         shift[POSITION], shift[ATTITUDE] = mean[:3], mean[3:]
-        position, _, attitude = strapdown.corrected(self._state, shift.tolist())
+        position, _, attitude = strapdown.inertial(strapdown.corrected(self._nominal, shift))
         return Inertial(position, self._velocity(attitude, airspeed), attitude)
 
     def start(self, airspeed: float, pose: Innovation, mount: Mount, noise: ImuNoise) -> Start:
@@ -120,6 +122,9 @@ class Alignment:
         spread[GYRO_BIAS, 9:12] = np.eye(3)
         spread[ACCEL_BIAS, 12:] = np.eye(3)
         return Start(state, spread @ source @ spread.T)
+
+
+_NO_BIAS = np.zeros(6)
 
 
 def _cross(v: Vec3) -> Array:

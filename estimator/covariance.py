@@ -30,7 +30,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.camera import Number, PinholeCamera
+from estimator.camera import Intrinsics, Number, PinholeCamera
 from estimator.so3 import Array
 
 LEFT, THRESHOLD, RIGHT = 0, 1, 2
@@ -82,12 +82,7 @@ class Equations(NamedTuple):
 
 
 def predicted_line(
-    camera: PinholeCamera,
-    line: int,
-    position: Sequence[Number],
-    axes: Sequence[Sequence[Number]],
-    width: Number,
-    xp: Number,
+    camera: Intrinsics, line: int, position: Sequence[Number], axes: Sequence[Sequence[Number]], width: Number
 ) -> Predicted:
     """The image of a runway line at a pose.
 
@@ -101,8 +96,6 @@ def predicted_line(
         The camera's x, y and z axes in the runway frame: the rows of R_cam_from_runway.
     width : float
         m.
-    xp : module
-        `math` with floats, `numpy` with arrays.
     """
     x, y, z = position
     (x0, x1, x2), (y0, y1, y2), (z0, z1, z2) = axes
@@ -114,12 +107,13 @@ def predicted_line(
         side = y + 0.5 * width if line == LEFT else y - 0.5 * width
         normal = (0.0, -z, side)
         in_cam = (side * x2 - z * x1, side * y2 - z * y1, side * z2 - z * z1)
-    a, b, c = camera.line_of_plane(in_cam)
-    return Predicted(a, b, c, normal, xp.sqrt(a * a + b * b))
+    a, b = in_cam[0] / camera.fx, in_cam[1] / camera.fy  # as camera.line_of_plane
+    c = in_cam[2] - a * camera.cx - b * camera.cy
+    return Predicted(a, b, c, normal, (a * a + b * b) ** 0.5)
 
 
 def line_equations(
-    camera: PinholeCamera, line: int, predicted: Predicted, axes: Sequence[Sequence[Number]], u: Number, v: Number
+    camera: Intrinsics, line: int, predicted: Predicted, axes: Sequence[Sequence[Number]], u: Number, v: Number
 ) -> Equations:
     """The equations of a line, from a pixel (u, v) of the predicted line at which its offset is taken."""
     (x0, x1, x2), (y0, y1, y2), (z0, z1, z2) = axes
@@ -242,11 +236,11 @@ def _equations(
     equations = []
     variances: list[Number] = []
     for line, noise in lines.items():
-        predicted = predicted_line(camera, line, where, axes, width, np)
+        predicted = predicted_line(camera.intrinsics, line, where, axes, width)
         a, b, c, _, gradient = predicted
         # the centroid, moved onto the predicted line
         off = (a * noise.u + b * noise.v + c) / gradient**2
-        equations.append(line_equations(camera, line, predicted, axes, noise.u - off * a, noise.v - off * b))
+        equations.append(line_equations(camera.intrinsics, line, predicted, axes, noise.u - off * a, noise.v - off * b))
         variances += [noise.offset_variance, noise.angle_variance]
     return where, axes, equations, variances
 

@@ -5,7 +5,7 @@ and its covariance at the rate of the camera.  After each update the error is ta
 zero.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
@@ -13,10 +13,10 @@ from filterpy.kalman import ExtendedKalmanFilter
 from estimator import strapdown
 from estimator.alignment import Start
 from estimator.camera import PinholeCamera
-from estimator.innovation import Innovation, Lines, pose_innovation
+from estimator.innovation import Eye, Innovation, frame_innovation
 from estimator.mount import Mount
-from estimator.so3 import Array, Vec3
-from estimator.strapdown import ImuNoise, Site
+from estimator.so3 import Array
+from estimator.strapdown import ImuNoise, Inertial, Site, advance, corrected, inertial, transition
 
 
 class Gates(NamedTuple):
@@ -64,10 +64,11 @@ class InertialVisionFilter:
 
     Attributes
     ----------
-    state : Inertial
-        Of the inertial unit, at the last `propagate`.
-    gyro_bias, accel_bias : (3,) float
-        rad/s and m/s², body frame.
+    nominal : (18,) array
+        Of the inertial unit, at the last `propagate`, as `Inertial.numbers` gives it.  Never written to: each step
+        makes a new one.
+    bias : (6,) array
+        Gyros (rad/s) and accelerometers (m/s²), body frame; never written to either.
     """
 
     def __init__(
@@ -80,26 +81,23 @@ class InertialVisionFilter:
         gates: Gates,
         start: Start,
     ) -> None:
-        self._camera = camera
-        self._width = width
-        self._mount = mount
-        self._site = site
+        self._eye = Eye(camera, width, mount).numbers()
+        self._site = site.numbers()
         self._noise = noise
         self._gates = gates
-        self.state = start.state
-        self.gyro_bias: Vec3 = (0.0, 0.0, 0.0)
-        self.accel_bias: Vec3 = (0.0, 0.0, 0.0)
+        self.nominal = start.state.numbers()
+        self.bias = np.zeros(6)
         self._ekf = _ErrorFilter(dim_x=strapdown.STATES, dim_z=6)
         self._zero = np.zeros(strapdown.STATES)
-        self._zero.flags.writeable = False
         self._ekf.x = self._zero
         self._ekf.P = start.covariance.copy()
-        self._ekf.F = np.eye(strapdown.STATES)
-        # numbers are written to a view of the buffer at a tenth of what an index of the array costs
-        self._transition: Any = memoryview(self._ekf.F.reshape(-1))
         self._noise_dt = 0.0
         self._elapsed = 0.0
-        self._fx = self._fy = self._fz = 0.0
+
+    @property
+    def state(self) -> Inertial:
+        """The nominal state, as tuples."""
+        return inertial(self.nominal)
 
     @property
     def covariance(self) -> Array:
@@ -107,19 +105,9 @@ class InertialVisionFilter:
         result: Array = self._ekf.P
         return result
 
-    def propagate(self, angle: Vec3, velocity: Vec3, dt: float) -> None:
-        """Carry the nominal state on by one interval, whose increments are as `strapdown.propagate` takes them."""
-        g, a = self.gyro_bias, self.accel_bias
-        self.state, force = strapdown.propagate(
-            self.state,
-            self._site,
-            (angle[0] - g[0] * dt, angle[1] - g[1] * dt, angle[2] - g[2] * dt),
-            (velocity[0] - a[0] * dt, velocity[1] - a[1] * dt, velocity[2] - a[2] * dt),
-            dt,
-        )
-        self._fx += force[0]
-        self._fy += force[1]
-        self._fz += force[2]
+    def propagate(self, sample: Array, dt: float) -> None:
+        """Carry the nominal state on by one interval, whose sample (6,) is as `strapdown.advance` takes it."""
+        self.nominal = advance(self.nominal, self.bias, sample, self._site, dt)
         self._elapsed += dt
 
     def predict(self) -> None:
@@ -131,28 +119,26 @@ class InertialVisionFilter:
         if abs(dt - self._noise_dt) > 1e-9:
             self._noise_dt = dt
             ekf.Q = strapdown.process_noise(self._noise, dt)
-        numbers = strapdown.transition(self.state.attitude, (self._fx, self._fy, self._fz), dt)
-        transition = self._transition
-        for place, number in zip(strapdown.TRANSITION_PLACES, numbers, strict=True):
-            transition[place] = number
+        ekf.F = transition(self.nominal, dt)
         ekf.predict()
-        self._elapsed = self._fx = self._fy = self._fz = 0.0
+        self._elapsed = 0.0
+        self.nominal = corrected(self.nominal, self._zero)
 
-    def observe(self, lines: Lines, tilt: float) -> Update:
+    def observe(self, lines: Array, tilt: float) -> Update:
         """Correct the state by one frame, if it passes the gate.  `predict` comes first.
 
         Parameters
         ----------
-        lines : Lines
+        lines : (3, 7) array
+            As `Lines.numbers` gives them.
         tilt : float
             Mount angle as read, rad.
         """
-        innovation = pose_innovation(
-            self._camera, self._width, self._mount, lines, self.state.position, self.state.attitude, tilt
-        )
-        if innovation is None:
+        innovation = Innovation(*frame_innovation(self._eye, lines, self.nominal, tilt))
+        degrees = len(innovation.y)
+        if degrees == 0:
             return NO_UPDATE
-        return self.apply(innovation, self._gates.early if lines.threshold is not None else self._gates.late)
+        return self.apply(innovation, self._gates.early if degrees == 6 else self._gates.late)
 
     def apply(self, innovation: Innovation, gate: float) -> Update:
         """Correct the state by any measurement of it, if it passes the gate.  `predict` comes first.
@@ -174,11 +160,9 @@ class InertialVisionFilter:
             ekf.P = before
             ekf.x = self._zero
             return Update(len(y), nis, False)
-        error = ekf.x.tolist()
-        self.state = strapdown.corrected(self.state, error)
-        (a, b, c), (d, e, f) = self.gyro_bias, self.accel_bias
-        self.gyro_bias = (a + error[9], b + error[10], c + error[11])
-        self.accel_bias = (d + error[12], e + error[13], f + error[14])
+        error = ekf.x
+        self.nominal = corrected(self.nominal, error)
+        self.bias = self.bias + error[9:]
         ekf.x = self._zero
         return Update(len(y), nis, True)
 

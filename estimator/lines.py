@@ -6,7 +6,6 @@ and σ²/S, S the sum of squared distances of the N points from their centroid a
 Computations, 4th ed., section 6.3, for total least squares).
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,17 +55,18 @@ def fit_variances(spread: Number, points: Number, sigma: float) -> tuple[Number,
     The spread as measured holds the noise along the line too, (N - 1) σ² of it, which is no lever arm: it is taken off,
     down to a tenth of the measured value where the points are all noise.
     """
-    noise = sigma * sigma
-    kept, floor = spread - (points - 1.0) * noise, 0.1 * spread
-    if isinstance(spread, float):
-        return noise / points, noise / max(kept, floor) if spread > 0.0 else math.inf
     with np.errstate(divide="ignore", invalid="ignore"):
-        angle = noise / np.maximum(kept, floor)
-    return noise / points, np.where(np.asarray(spread) > 0.0, angle, math.inf)
+        return unguarded_variances(spread, points, sigma)
+
+
+def unguarded_variances(spread: Number, points: Number, sigma: float) -> tuple[Number, Number]:
+    """The variances of `fit_variances`, without its care for a spread of zero."""
+    noise = sigma * sigma
+    return noise / points, noise / np.maximum(spread - (points - 1.0) * noise, 0.1 * spread)
 
 
 def line_from_moments(
-    u: Number, v: Number, suu: Number, suv: Number, svv: Number, xp: Number
+    u: Number, v: Number, suu: Number, suv: Number, svv: Number
 ) -> tuple[Number, Number, Number, Number]:
     """Line and spread (a, b, c, S) from the points' mean and centred second moments.
 
@@ -78,11 +78,9 @@ def line_from_moments(
         Mean of the points, px.
     suu, suv, svv : float or (...) array
         Sums of products about the mean, px².
-    xp : module
-        `math` for floats, `numpy` for arrays.
     """
-    angle = 0.5 * xp.atan2(2.0 * suv, suu - svv)
-    along_u, along_v = xp.cos(angle), xp.sin(angle)
+    angle = 0.5 * np.arctan2(2.0 * suv, suu - svv)
+    along_u, along_v = np.cos(angle), np.sin(angle)
     spread = along_u * along_u * suu + 2.0 * along_u * along_v * suv + along_v * along_v * svv
     a, b = -along_v, along_u
     return a, b, -(a * u + b * v), spread
@@ -108,6 +106,6 @@ def fit_line(points: ArrayLike) -> LineFit:
     centred = points - centroid[..., None, :]
     scatter = np.swapaxes(centred, -1, -2) @ centred
     a, b, c, spread = line_from_moments(
-        centroid[..., 0], centroid[..., 1], scatter[..., 0, 0], scatter[..., 0, 1], scatter[..., 1, 1], np
+        centroid[..., 0], centroid[..., 1], scatter[..., 0, 0], scatter[..., 0, 1], scatter[..., 1, 1]
     )
     return LineFit(np.stack((a, b, c), axis=-1), centroid, np.asarray(spread), points.shape[-2])

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimator.so3 import Array, Mat3, Vec3, flat, rotate
+from estimator.compiled import compiled, rotate
+from estimator.so3 import Array, Mat3, Vec3, flat
 
 
 class Mount(NamedTuple):
@@ -27,6 +28,7 @@ class BodyPose(NamedTuple):
     """R_runway_from_body."""
 
 
+@compiled
 def camera_axes(attitude: Mat3, tilt: float) -> tuple[Vec3, Vec3, Vec3]:
     """The camera's x, y and z axes in the runway frame: the rows of R_cam_from_runway.
 
@@ -41,6 +43,7 @@ def camera_axes(attitude: Mat3, tilt: float) -> tuple[Vec3, Vec3, Vec3]:
     )
 
 
+@compiled
 def camera_position(position: Vec3, attitude: Mat3, lever: Vec3) -> Vec3:
     """The projection centre, runway frame, m."""
     x, y, z = rotate(attitude, lever)

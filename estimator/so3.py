@@ -1,7 +1,7 @@
 """Rotations on plain numbers: 3-vectors as 3-tuples, 3 × 3 matrices as 9-tuples, row by row.
 
-A small array costs more to allocate than to compute with, so what runs at the rate of the inertial unit works on
-tuples of floats.  Every function is pure.
+On tuples of floats the same text serves as it stands and compiled (`estimator.compiled`), where a small array would
+cost more to allocate than to compute with.  Every function is pure and calls no other that is compiled.
 """
 
 import math
@@ -91,22 +91,18 @@ def exp(vector: Vec3) -> Mat3:
 
 def log(a: Mat3) -> Vec3:
     """The rotation vector (rad) of a rotation matrix; for angles below π."""
-    return _log(0.5 * (a[7] - a[5]), 0.5 * (a[2] - a[6]), 0.5 * (a[3] - a[1]), 0.5 * (a[0] + a[4] + a[8] - 1.0))
+    return log_between(IDENTITY, a)
 
 
 def log_between(a: Mat3, b: Mat3) -> Vec3:
-    """The rotation vector (rad) of aᵀ b, without the product's other numbers."""
+    """The rotation vector (rad) of aᵀ b, without the product's other numbers; for angles below π."""
     a0, a1, a2, a3, a4, a5, a6, a7, a8 = a
     b0, b1, b2, b3, b4, b5, b6, b7, b8 = b
-    return _log(
-        0.5 * (a2 * b1 + a5 * b4 + a8 * b7 - a1 * b2 - a4 * b5 - a7 * b8),
-        0.5 * (a0 * b2 + a3 * b5 + a6 * b8 - a2 * b0 - a5 * b3 - a8 * b6),
-        0.5 * (a1 * b0 + a4 * b3 + a7 * b6 - a0 * b1 - a3 * b4 - a6 * b7),
-        0.5 * (a0 * b0 + a1 * b1 + a2 * b2 + a3 * b3 + a4 * b4 + a5 * b5 + a6 * b6 + a7 * b7 + a8 * b8 - 1.0),
-    )
-
-
-def _log(x: float, y: float, z: float, cosine: float) -> Vec3:
+    x = 0.5 * (a2 * b1 + a5 * b4 + a8 * b7 - a1 * b2 - a4 * b5 - a7 * b8)
+    y = 0.5 * (a0 * b2 + a3 * b5 + a6 * b8 - a2 * b0 - a5 * b3 - a8 * b6)
+    z = 0.5 * (a1 * b0 + a4 * b3 + a7 * b6 - a0 * b1 - a3 * b4 - a6 * b7)
+    trace = a0 * b0 + a1 * b1 + a2 * b2 + a3 * b3 + a4 * b4 + a5 * b5 + a6 * b6 + a7 * b7 + a8 * b8
+    cosine = 0.5 * (trace - 1.0)
     sine2 = x * x + y * y + z * z
     if sine2 < 1e-8 and cosine > 0.0:
         k = 1.0 + sine2 / 6.0

@@ -9,22 +9,18 @@ Errors are true less estimated; that of the attitude is a rotation vector ψ in 
 R_true = exp([ψ×]) R_estimated.
 """
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from estimator.so3 import (
-    Array,
-    Mat3,
-    Vec3,
-    exp,
-    log_between,
-    matmul,
-)
+from estimator.compiled import compiled, exp, log_between, matmul, to_euler
+from estimator.so3 import Array, Mat3, Vec3
 
 POSITION, VELOCITY, ATTITUDE, GYRO_BIAS, ACCEL_BIAS = (slice(3 * i, 3 * i + 3) for i in range(5))
 STATES = 15
+NOMINAL = 18
+"""Numbers of a nominal state as an array: position, velocity, attitude (9, row by row), and the specific force
+(runway frame, m/s) integrated since it was last set to zero."""
 
 
 class Site(NamedTuple):
@@ -37,6 +33,10 @@ class Site(NamedTuple):
     radius: float
     """Of the Earth, m."""
 
+    def numbers(self) -> Array:
+        """(5,) array, as the functions over arrays take it."""
+        return np.array((self.gravity, *self.earth_rate, self.radius))
+
 
 class Inertial(NamedTuple):
     """Position (m), velocity (m/s), runway frame, and attitude R_runway_from_body."""
@@ -44,6 +44,16 @@ class Inertial(NamedTuple):
     position: Vec3
     velocity: Vec3
     attitude: Mat3
+
+    def numbers(self) -> Array:
+        """(18,) array, as the functions over arrays take it, with no specific force yet."""
+        return np.array((*self.position, *self.velocity, *self.attitude, 0.0, 0.0, 0.0))
+
+
+def inertial(nominal: Array) -> Inertial:
+    """The tuples of a nominal state (15 or more,)."""
+    n = nominal.tolist()
+    return Inertial((n[0], n[1], n[2]), (n[3], n[4], n[5]), (n[6], n[7], n[8], n[9], n[10], n[11], n[12], n[13], n[14]))
 
 
 class ImuNoise(NamedTuple):
@@ -70,6 +80,7 @@ def gravity_at(site: Site, position: Vec3) -> Vec3:
     return -k * position[0], -k * position[1], g + 2.0 * k * position[2]
 
 
+@compiled
 def propagate(state: Inertial, site: Site, angle: Vec3, velocity: Vec3, dt: float) -> tuple[Inertial, Vec3]:
     """One interval of the inertial unit.
 
@@ -90,7 +101,7 @@ def propagate(state: Inertial, site: Site, angle: Vec3, velocity: Vec3, dt: floa
     Inertial
         At the interval's end.
     force : (3,) float
-        The interval's integrated specific force in the runway frame, m/s, as `transition` takes it.
+        The interval's integrated specific force in the runway frame, m/s.
     """
     (px, py, pz), (vx, vy, vz), attitude = state
     a, b, c, d, e, f, g, h, i = attitude
@@ -112,6 +123,7 @@ def propagate(state: Inertial, site: Site, angle: Vec3, velocity: Vec3, dt: floa
     return Inertial(moved, (ux, uy, uz), matmul(attitude, exp(turn))), force
 
 
+@compiled
 def increments(
     position: Vec3, velocity: Vec3, attitude: Mat3, next_velocity: Vec3, next_attitude: Mat3, site: Site, dt: float
 ) -> tuple[Vec3, Vec3]:
@@ -152,56 +164,98 @@ def increments(
     )
 
 
-def transition(attitude: Mat3, force: Vec3, dt: float) -> tuple[float, ...]:
-    """Transition matrix of the 15 errors over several intervals of the inertial unit: what it has besides its identity.
+@compiled
+def unpacked(n: Array) -> Inertial:
+    """As `inertial`, for compiled functions."""
+    return Inertial((n[0], n[1], n[2]), (n[3], n[4], n[5]), (n[6], n[7], n[8], n[9], n[10], n[11], n[12], n[13], n[14]))
+
+
+@compiled
+def advance(nominal: Array, bias: Array, sample: Array, site: Array, dt: float) -> Array:
+    """One interval of the inertial unit, as `propagate`, over arrays.
+
+    Parameters
+    ----------
+    nominal : (18,) array
+        At the interval's start, as `Inertial.numbers` gives it.
+    bias : (6,) array
+        Gyros (rad/s) and accelerometers (m/s²), taken off the sample.
+    sample : (6,) array
+        Integrated angular rate (rad) and specific force (m/s), body frame.
+    site : (5,) array
+        As `Site.numbers` gives it.
+    dt : float
+        s.
+
+    Returns
+    -------
+    (18,) array
+        At the interval's end.
+    """
+    place = Site(site[0], (site[1], site[2], site[3]), site[4])
+    angle = (sample[0] - bias[0] * dt, sample[1] - bias[1] * dt, sample[2] - bias[2] * dt)
+    velocity = (sample[3] - bias[3] * dt, sample[4] - bias[4] * dt, sample[5] - bias[5] * dt)
+    moved, force = propagate(unpacked(nominal), place, angle, velocity, dt)
+    result = np.empty(18)
+    for i in range(3):
+        result[i] = moved.position[i]
+        result[3 + i] = moved.velocity[i]
+        result[15 + i] = nominal[15 + i] + force[i]
+    for i in range(9):
+        result[6 + i] = moved.attitude[i]
+    return result
+
+
+@compiled
+def ideal_sample(before: Array, after: Array, site: Array, dt: float) -> Array:
+    """What an ideal inertial unit reports between two states (15 or more,), as `increments`: (6,) array."""
+    place = Site(site[0], (site[1], site[2], site[3]), site[4])
+    start, end = unpacked(before), unpacked(after)
+    angle, velocity = increments(start.position, start.velocity, start.attitude, end.velocity, end.attitude, place, dt)
+    return np.array((angle[0], angle[1], angle[2], velocity[0], velocity[1], velocity[2]))
+
+
+@compiled
+def euler(nominal: Array) -> Vec3:
+    """Roll, pitch and yaw (rad) of a nominal state."""
+    return to_euler(unpacked(nominal).attitude)
+
+
+@compiled
+def transition(nominal: Array, dt: float) -> Array:
+    """Transition matrix of the 15 errors over several intervals of the inertial unit.
 
     To second order in time where a bias or the attitude moves velocity and position; what a gyro bias does to them
     within the time is of a higher order, and reaches them through the attitude in the next.
 
     Parameters
     ----------
-    attitude : Mat3
-        R_runway_from_body.
-    force : (3,) float
-        Specific force in the runway frame, integrated over the time, m/s.
+    nominal : (18,) array
+        At the end of the time, with the specific force integrated over it.
     dt : float
         s.
 
     Returns
     -------
-    tuple of float
-        The numbers at `TRANSITION_PLACES`.
+    (15, 15) array
     """
-    x, y, z = force
-    a, b, c, d, e, f, g, h, i = attitude
-    n, k = -dt, 0.5 * dt
-    m = k * n
-    turn = (n * a, n * b, n * c, n * d, n * e, n * f, n * g, n * h, n * i)
-    return (
-        dt, dt, dt,
-        k * z, -k * y, -k * z, k * x, k * y, -k * x,
-        m * a, m * b, m * c, m * d, m * e, m * f, m * g, m * h, m * i,
-        z, -y, -z, x, y, -x,
-        *turn,
-        *turn,
-    )  # fmt: skip
-
-
-def _places(row: slice, column: slice, kind: str) -> list[int]:
-    """Where the numbers of a 3 × 3 block lie in the matrix, row by row: its diagonal, what lies off it, or all."""
-    chosen = {"diagonal": (True,), "skew": (False,), "full": (True, False)}[kind]
-    return [STATES * (row.start + i) + column.start + j for i in range(3) for j in range(3) if (i == j) in chosen]
-
-
-TRANSITION_PLACES = tuple(
-    _places(POSITION, VELOCITY, "diagonal")
-    + _places(POSITION, ATTITUDE, "skew")
-    + _places(POSITION, ACCEL_BIAS, "full")
-    + _places(VELOCITY, ATTITUDE, "skew")
-    + _places(VELOCITY, ACCEL_BIAS, "full")
-    + _places(ATTITUDE, GYRO_BIAS, "full")
-)
-"""Where the numbers of `transition` lie in the (15, 15) matrix, counted row by row."""
+    x, y, z = nominal[15], nominal[16], nominal[17]
+    result = np.eye(15)
+    half = 0.5 * dt
+    for i in range(3):
+        result[i, 3 + i] = dt
+        for j in range(3):
+            turned = -dt * nominal[6 + 3 * i + j]
+            result[i, 12 + j] = half * turned
+            result[3 + i, 12 + j] = turned
+            result[6 + i, 9 + j] = turned
+    # minus the cross product with the force: ψ turns it by ψ × f
+    result[3, 7], result[3, 8], result[4, 6] = z, -y, -z
+    result[4, 8], result[5, 6], result[5, 7] = x, y, -x
+    for i in range(3):
+        for j in range(3):
+            result[i, 6 + j] = half * result[3 + i, 6 + j]
+    return result
 
 
 def process_noise(noise: ImuNoise, dt: float) -> Array:
@@ -223,11 +277,13 @@ def process_noise(noise: ImuNoise, dt: float) -> Array:
     return result
 
 
-def corrected(state: Inertial, error: Sequence[float]) -> Inertial:
-    """The state with the first nine of the errors taken into it; the biases are the caller's."""
-    (px, py, pz), (vx, vy, vz), attitude = state
-    return Inertial(
-        (px + error[0], py + error[1], pz + error[2]),
-        (vx + error[3], vy + error[4], vz + error[5]),
-        matmul(exp((error[6], error[7], error[8])), attitude),
-    )
+@compiled
+def corrected(nominal: Array, error: Array) -> Array:
+    """The nominal state (18,) with the first nine of the errors taken into it, and no specific force any more."""
+    attitude = matmul(exp((error[6], error[7], error[8])), unpacked(nominal).attitude)
+    result = np.zeros(18)
+    for i in range(6):
+        result[i] = nominal[i] + error[i]
+    for i in range(9):
+        result[6 + i] = attitude[i]
+    return result

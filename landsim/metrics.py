@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 Array: TypeAlias = NDArray[np.float64]
 Log: TypeAlias = Mapping[str, Array]
 
-ENDS = ("stopped", "timeout", "diverged", "trim_failed", "error", "structure_contact", "below_ground", "fault")
+ENDS = (
+    "stopped", "touchdown", "timeout", "diverged", "trim_failed", "error", "structure_contact", "below_ground", "fault",
+)  # fmt: skip
 """Why the simulation loop ended."""
 CRASHES = {
     "structure_contact": "a part that is not a wheel touched the ground",
@@ -186,7 +188,8 @@ def judge(
         return Verdict("error", "the loop ended for a fault at the wheels that the log does not show")
     if touchdown is None:
         return Verdict("error", "stopped without contact of a main wheel")
-    return Verdict("landed", "main wheels first, within the gear's limit, stopped on the runway")
+    last = "stopped on the runway" if end == "stopped" else "not flown beyond the touchdown"
+    return Verdict("landed", f"main wheels first, within the gear's limit, {last}")
 
 
 def box_limits(
@@ -335,6 +338,8 @@ def flight_metrics(
             "time_s": float(log["time_s"][-1]),
         }
     box = box_limits(touchdown, None if stop is None else stop["y_m"], verdict.outcome, scenario.box)
+    if scenario.simulation.end == "touchdown":
+        del box["stop_cross_max_m"]
     rows = np.arange(n)
     flown = log["body_x_m"] >= BEGIN
     airborne = flown & (rows < (n if touchdown is None else touchdown.row))

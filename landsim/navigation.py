@@ -7,17 +7,21 @@ lines whenever the threshold is in view and two when it is not.
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from estimator.alignment import Alignment, Incidence
 from estimator.camera import PinholeCamera
+from estimator.compiled import compiled
+from estimator.covariance import LEFT, RIGHT, THRESHOLD
 from estimator.fusion import NO_UPDATE, Gates, InertialVisionFilter, Update
-from estimator.innovation import LineObservation, Lines, pose_innovation
-from estimator.lines import fit_variances
+from estimator.innovation import Eye, Innovation, frame_innovation
+from estimator.lines import unguarded_variances
 from estimator.mount import Mount, body_from_camera, camera_axes
-from estimator.so3 import IDENTITY, Vec3, rotate_back, to_euler
-from estimator.strapdown import ImuNoise, Inertial, Site
+from estimator.so3 import IDENTITY, Array, Mat3, Vec3, rotate_back
+from estimator.strapdown import ImuNoise, Inertial, Site, euler, inertial
 from estimator.three_line import three_line_pose
 from landsim.config import MountConfig, NavigationConfig
-from landsim.state import CameraFrame, ImuSample, LineReading, NavState, Stage
+from landsim.state import CameraFrame, ImuSample, NavState, Stage
 from landsim.units import DEG
 
 NAN = math.nan
@@ -35,6 +39,8 @@ class FrameResult(NamedTuple):
     stage: Stage
     roll: float
     """Of the camera triad, as predicted: what the late stage borrows, rad; NaN where it borrows none."""
+    late: bool
+    """Whether the threshold, in view or not, was left out of account."""
 
 
 class Navigator:
@@ -93,7 +99,9 @@ class Navigator:
         self._smoothing = 1.0 - math.exp(-imu_dt / config.airspeed_smoothing_s)
         self._rejected = 0
         self.airspeed = NAN
-        self._angle: Vec3 = (0.0, 0.0, 0.0)
+        self._sample = np.zeros(6)
+        self._latch = config.handover == "latched"
+        self._late = False
         self.stage = Stage.NONE
         self.filter: InertialVisionFilter | None = None
 
@@ -109,56 +117,48 @@ class Navigator:
 
     def propagate(self, sample: ImuSample) -> None:
         """Take in a sample of the inertial unit."""
-        self._angle = sample.angle
+        self._sample = sample
         if self.filter is None:
-            self._alignment.propagate(sample.angle, sample.velocity, self._dt)
+            self._alignment.propagate(sample, self._dt)
         else:
-            self.filter.propagate(sample.angle, sample.velocity, self._dt)
+            self.filter.propagate(sample, self._dt)
 
     def observe(self, frame: CameraFrame) -> FrameResult:
         """Take in a camera frame."""
-        lines = Lines(self._observation(frame.left), self._observation(frame.threshold), self._observation(frame.right))
+        lines = _observed(frame.lines, self._noise_px)
         if self.filter is None:
             return self._align(lines, frame.tilt)
         self.filter.predict()
         roll = NAN
-        if frame.threshold is None:
+        if self._latch:
+            self._late = self._late or threshold_has_left(lines)
+            if self._late:
+                lines[THRESHOLD] = NAN
+        if math.isnan(lines[THRESHOLD, 0]):
             right, down, _ = camera_axes(self.filter.state.attitude, frame.tilt)
             roll = math.atan2(right[2], down[2])
         update = self.filter.observe(lines, frame.tilt)
         if update.degrees > 0:
             self._rejected = 0 if update.accepted else self._rejected + 1
         self.stage = Stage.NONE if not update.accepted else Stage.EARLY if update.degrees == 6 else Stage.LATE
-        return FrameResult(update, self.stage, roll)
+        return FrameResult(update, self.stage, roll, self._late)
 
-    def _observation(self, reading: LineReading | None) -> LineObservation | None:
-        if reading is None:
-            return None
-        offset, angle = fit_variances(reading.spread, reading.points, self._noise_px)
-        return LineObservation(reading.a, reading.b, reading.c, reading.centroid_u, reading.centroid_v, offset, angle)
-
-    def _align(self, lines: Lines, tilt: float) -> FrameResult:
+    def _align(self, lines: Array, tilt: float) -> FrameResult:
         """One of the first frames: the filter starts when there are enough."""
         self.stage = Stage.NONE
-        left, threshold, right = lines
-        if left is None or threshold is None or right is None:
-            return FrameResult(NO_UPDATE, Stage.NONE, NAN)
-        solution = three_line_pose(
-            self._camera,
-            (left.a, left.b, left.c),
-            (threshold.a, threshold.b, threshold.c),
-            (right.a, right.b, right.c),
-            runway_width=self._width,
-        )
+        left, threshold, right = lines[:, :3]
+        solution = three_line_pose(self._camera, left, threshold, right, runway_width=self._width)
         if not solution.valid:
-            return FrameResult(NO_UPDATE, Stage.NONE, NAN)
+            return FrameResult(NO_UPDATE, Stage.NONE, NAN, late=False)
         x, y, z = solution.position.tolist()
         body = body_from_camera((x, y, z), solution.R_cam_from_runway, tilt, self._mount.lever)
         if self._alignment.add(body, self.airspeed):
             state = self._alignment.mean(self.airspeed)
-            pose = pose_innovation(self._camera, self._width, self._mount, lines, state.position, state.attitude, tilt)
-            turn_sigma = math.inf if pose is None else math.sqrt(max(pose.R[3, 3], pose.R[4, 4], pose.R[5, 5]))
-            if pose is None or turn_sigma > self._config.start_attitude_sigma_deg * DEG:
+            eye = Eye(self._camera, self._width, self._mount).numbers()
+            pose = Innovation(*frame_innovation(eye, lines, state.numbers(), tilt))
+            usable = len(pose.y) == 6
+            turn_sigma = math.sqrt(max(pose.R[3, 3], pose.R[4, 4], pose.R[5, 5])) if usable else math.inf
+            if turn_sigma > self._config.start_attitude_sigma_deg * DEG:
                 # so far away a mean of poses is no start: begin again, nearer
                 self._alignment = self._new_alignment()
             else:
@@ -167,7 +167,7 @@ class Navigator:
                     self._camera, self._width, self._mount, self._site, self._imu, self._gates, start
                 )
         self.stage = Stage.EARLY
-        return FrameResult(NO_UPDATE, Stage.EARLY, NAN)
+        return FrameResult(NO_UPDATE, Stage.EARLY, NAN, late=False)
 
     @property
     def diverged(self) -> str | None:
@@ -176,7 +176,7 @@ class Navigator:
             return None
         p = self.filter.covariance
         sigma2 = float(p[0, 0]) + float(p[1, 1]) + float(p[2, 2])
-        if not math.isfinite(sigma2) or not math.isfinite(sum(self.filter.state.position)):
+        if not math.isfinite(sigma2 + float(self.filter.nominal.sum())):
             return "its numbers are not finite"
         if sigma2 > self._config.max_position_sigma_m**2:
             return f"its position sigma is {math.sqrt(sigma2):.1f} m"
@@ -185,21 +185,20 @@ class Navigator:
         return None
 
     @property
-    def inertial(self) -> Inertial:
-        """Position, velocity and attitude of the body; not to be used before the filter has started."""
-        return _UNKNOWN if self.filter is None else self.filter.state
+    def nominal(self) -> Array:
+        """Position, velocity and attitude of the body (18,); not to be used before the filter has started."""
+        return _UNKNOWN if self.filter is None else self.filter.nominal
 
     def roll_and_pitch(self) -> tuple[float, float]:
         """Of the body, rad: what the inner loops need between two calls of guidance."""
-        if self.filter is None:
-            return 0.0, 0.0
-        a = self.filter.state.attitude
-        return math.atan2(a[7], a[8]), math.atan2(-a[6], math.hypot(a[0], a[3]))
+        roll, pitch, _ = euler(self.nominal)
+        return roll, pitch
 
     def state(self, time: float) -> NavState:
         """What guidance is given."""
-        position, velocity, attitude = self.inertial
-        roll, pitch, yaw = to_euler(attitude)
+        nominal = self.nominal
+        position, velocity, attitude = inertial(nominal)
+        roll, pitch, yaw = euler(nominal)
         return NavState(
             time,
             self.filter is not None,
@@ -209,19 +208,37 @@ class Navigator:
             roll,
             pitch,
             yaw,
-            self._body_rate(),
+            self._body_rate(attitude),
             self.airspeed,
             self.stage,
         )
 
-    def _body_rate(self) -> Vec3:
+    def _body_rate(self, attitude: Mat3) -> Vec3:
         """Relative to the ground, less the estimated bias, rad/s."""
-        bias = _ZERO if self.filter is None else self.filter.gyro_bias
-        earth = _ZERO if self.filter is None else rotate_back(self.filter.state.attitude, self._site.earth_rate)
-        x, y, z = self._angle
+        x, y, z, *_ = self._sample.tolist()
         dt = self._dt
-        return x / dt - bias[0] - earth[0], y / dt - bias[1] - earth[1], z / dt - bias[2] - earth[2]
+        if self.filter is None:
+            return x / dt, y / dt, z / dt
+        p, q, r, *_ = self.filter.bias.tolist()
+        earth = rotate_back(attitude, self._site.earth_rate)
+        return x / dt - p - earth[0], y / dt - q - earth[1], z / dt - r - earth[2]
 
 
-_ZERO: Vec3 = (0.0, 0.0, 0.0)
-_UNKNOWN = Inertial(_ZERO, _ZERO, IDENTITY)
+_UNKNOWN = Inertial((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), IDENTITY).numbers()
+
+
+_variances = compiled(unguarded_variances)
+
+
+@compiled
+def _observed(readings: Array, noise_px: float) -> Array:
+    """A frame's lines (3, 7) as the filter takes them: in place of spread and number of points, variances."""
+    result = readings.copy()
+    for line in range(3):
+        result[line, 5], result[line, 6] = _variances(readings[line, 5], readings[line, 6], noise_px)
+    return result
+
+
+def threshold_has_left(lines: Array) -> bool:
+    """Whether a frame (3, 7) shows both edges and no threshold."""
+    return not math.isnan(lines[LEFT, 0] + lines[RIGHT, 0]) and math.isnan(lines[THRESHOLD, 0])

@@ -16,8 +16,9 @@ from typing import NamedTuple
 import jsbsim
 import numpy as np
 
+from estimator.compiled import compiled
 from estimator.so3 import Array, Vec3, rotate, rotate_back
-from landsim.attitude import rotation_at
+from landsim.attitude import runway_attitude
 from landsim.errors import InputError
 from landsim.runway import Runway
 from landsim.state import Command
@@ -209,9 +210,13 @@ class Plant:
 
     def __init__(self, folder: Path, model: str, runway: Runway, rate_hz: float) -> None:
         self._runway = runway
-        self._attitude = rotation_at(runway.latitude, runway.longitude, runway.heading)
-        self._runway_from_ecef_ft = tuple(FT * r for r in runway.R_runway_from_ecef)
-        self._origin = rotate(runway.R_runway_from_ecef, runway.origin_in_ecef)
+        self._site = np.array(
+            (
+                *(FT * r for r in runway.R_runway_from_ecef),
+                *rotate(runway.R_runway_from_ecef, runway.origin_in_ecef),
+                *(runway.latitude, runway.longitude, runway.heading),
+            )
+        )
         self._dt = 1.0 / rate_hz
         self._steps = 0
         self._started = False
@@ -379,11 +384,7 @@ class Plant:
             x, y, z, altitude, latitude, longitude, vx, vy, vz, phi, theta, psi, airspeed,
             elevator, aileron, rudder, throttle, thrust,
         ) = [read() for read in self._read]  # fmt: skip
-        # products written out: a call costs more than what it would compute
-        r0, r1, r2, r3, r4, r5, r6, r7, r8 = self._runway_from_ecef_ft
-        x0, y0, z0 = self._origin
-        down = r6 * x + r7 * y + r8 * z - z0
-        cosine, R_runway_from_body = self._attitude(latitude, longitude, phi, theta, psi)
+        motion, down, cosine = _motion(self._site, x, y, z, vx, vy, vz, latitude, longitude, phi, theta, psi)
         nose = left = right = touching = False
         if down > -CONTACT_HEIGHT:
             # here the ellipsoid's normal through the aircraft meets the runway's plane
@@ -392,9 +393,7 @@ class Plant:
             touching = any([read() != 0.0 for read in self._structure])  # noqa: C419 (a list is faster)
         return Truth(
             self._steps * self._dt,
-            (r0 * x + r1 * y + r2 * z - x0, r3 * x + r4 * y + r5 * z - y0, down),
-            (r0 * vx + r1 * vy + r2 * vz, r3 * vx + r4 * vy + r5 * vz, r6 * vx + r7 * vy + r8 * vz),
-            R_runway_from_body,
+            motion,
             FT * airspeed,
             nose,
             left,
@@ -406,3 +405,37 @@ class Plant:
             throttle,
             LBF * thrust,
         )
+
+
+_attitude = compiled(runway_attitude)
+
+
+@compiled
+def _motion(
+    site: Array,
+    x: float,
+    y: float,
+    z: float,
+    vx: float,
+    vy: float,
+    vz: float,
+    latitude: float,
+    longitude: float,
+    phi: float,
+    theta: float,
+    psi: float,
+) -> tuple[Array, float, float]:
+    """From JSBSim's position and velocity (ECEF, ft) and angles (rad) to `Truth.motion`.
+
+    `site` is R_runway_from_ecef times a foot, the origin in its axes (m), latitude, longitude and heading.  Given
+    besides are the z of the position (m) and the cosine of the angle between the verticals.
+    """
+    cosine, attitude = _attitude(site[12], site[13], site[14], latitude, longitude, phi, theta, psi)
+    motion = np.empty(15)
+    for i in range(3):
+        a, b, c = site[3 * i], site[3 * i + 1], site[3 * i + 2]
+        motion[i] = a * x + b * y + c * z - site[9 + i]
+        motion[3 + i] = a * vx + b * vy + c * vz
+    for i in range(9):
+        motion[6 + i] = attitude[i]
+    return motion, motion[2], cosine

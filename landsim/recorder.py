@@ -5,7 +5,7 @@ afterwards, for all rows at once.
 """
 
 import contextlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import chain
 from typing import NamedTuple
 
@@ -15,14 +15,14 @@ from estimator.camera import PinholeCamera
 from estimator.fusion import InertialVisionFilter
 from estimator.innovation import camera_sigma
 from estimator.mount import Mount, camera_triads
-from estimator.so3 import Array, Mat3, Vec3
-from estimator.strapdown import ACCEL_BIAS, GYRO_BIAS, Inertial
+from estimator.so3 import Array, Vec3
+from estimator.strapdown import ACCEL_BIAS, GYRO_BIAS
 from estimator.three_line import three_line_pose
 from estimator.two_line import two_line_pose
 from landsim.log import AXES, COLUMNS, ENDS, LINES, QUANTITIES
 from landsim.navigation import FrameResult, Navigator
 from landsim.sensors import Imu, View
-from landsim.state import Command, LineReading, Phase
+from landsim.state import Command, Phase
 from landsim.truth import Truth
 from landsim.units import DEG, DEG_PER_HOUR
 
@@ -36,11 +36,9 @@ class Body(NamedTuple):
 
 
 FRAME = {
-    "roll": 1, "nis_dof": 1, "nis": 1, "accepted": 1,
-    "left_true": 4, "threshold_true": 4, "right_true": 4,
-    "left_line": 3, "left_ends": 4, "threshold_line": 3, "threshold_ends": 4, "right_line": 3, "right_ends": 4,
+    "roll": 1, "late": 1, "nis_dof": 1, "nis": 1, "accepted": 1,
 }  # fmt: skip
-"""What `Recorder.frame` takes down, in its order, and how many numbers each is."""
+"""The single numbers that `Recorder.frame` takes down, in its order."""
 
 
 def _columns(rows: int, numbers: Iterable[float]) -> Array:
@@ -56,12 +54,9 @@ def _scalars(truth: Truth) -> tuple[float, ...]:
     )  # fmt: skip
 
 
-def _body(position: list[Vec3], velocity: list[Vec3], attitude: list[Mat3]) -> Body:
-    return Body(
-        np.fromiter(chain.from_iterable(position), float, 3 * len(position)).reshape(-1, 3),
-        np.fromiter(chain.from_iterable(velocity), float, 3 * len(velocity)).reshape(-1, 3),
-        np.fromiter(chain.from_iterable(attitude), float, 9 * len(attitude)).reshape(-1, 3, 3),
-    )
+def _body(motions: Sequence[Array]) -> Body:
+    rows = np.array(motions)
+    return Body(rows[:, :3], rows[:, 3:6], rows[:, 6:15].reshape(-1, 3, 3))
 
 
 def _named(rows: Array, widths: dict[str, int]) -> dict[str, Array]:
@@ -101,13 +96,17 @@ class Recorder:
         self._mount = mount
         self._wheels = wheels
         self._truths: list[Truth] = []
-        self._inertials: list[Inertial] = []
+        self._nominals: list[Array] = []
         self._commands: list[Command] = []
         self._others: list[float] = []
         self._count = 0
         self._frames: list[float] = []
         self._frame_rows: list[int] = []
-        self._filter: list[float] = []
+        self._lines: list[Array] = []
+        self._true_ends: list[Array] = []
+        self._seen_ends: list[Array] = []
+        self._bias: list[Array] = []
+        self._errors: list[Array] = []
         self._filter_rows: list[int] = []
         self._covariance: list[Array] = []
 
@@ -124,23 +123,21 @@ class Recorder:
         """Take down a step; the frame of the same step comes before it."""
         self._count += 1
         self._truths.append(truth)
-        self._inertials.append(navigator.inertial)
+        self._nominals.append(navigator.nominal)
         self._commands.append(command)
         self._others += (navigator.filter is not None, navigator.stage, phase, pitot, tilt, reading)
 
     def frame(self, view: View, result: FrameResult, running: InertialVisionFilter | None, imu: Imu) -> None:
         """Take down a camera frame."""
-        left, threshold, right = view.true_ends
-        frame, update = view.frame, result.update
-        self._frames += (
-            result.roll,
-            update.degrees, update.nis, update.accepted,
-            *(left or _NOTHING), *(threshold or _NOTHING), *(right or _NOTHING),
-            *_seen(frame.left), *_seen(frame.threshold), *_seen(frame.right),
-        )  # fmt: skip
+        update = result.update
+        self._frames += (result.roll, result.late, update.degrees, update.nis, update.accepted)
+        self._lines.append(view.frame.lines)
+        self._true_ends.append(view.true_ends)
+        self._seen_ends.append(view.seen_ends)
         self._frame_rows.append(self._count)
         if running is not None:
-            self._filter += (*running.gyro_bias, *running.accel_bias, *imu.errors())
+            self._bias.append(running.bias)
+            self._errors.append(imu.errors())
             self._filter_rows.append(self._count)
             self._covariance.append(running.covariance)
 
@@ -150,9 +147,8 @@ class Recorder:
         if self._count == 0:
             return log
         ready, stage, phase, pitot, tilt, reading = _columns(self._count, self._others)
-        truths, inertials = self._truths, self._inertials
-        true = _body([t.position for t in truths], [t.velocity for t in truths], [t.R_runway_from_body for t in truths])
-        fused = _body([i.position for i in inertials], [i.velocity for i in inertials], [i.attitude for i in inertials])
+        truths = self._truths
+        true, fused = _body([truth.motion for truth in truths]), _body(self._nominals)
         for known in fused:
             known[ready == 0.0] = np.nan
         airspeed, *wow, elevator, aileron, rudder, throttle = _columns(
@@ -189,22 +185,23 @@ class Recorder:
         if not self._frame_rows:
             return
         at = np.array(self._frame_rows)
-        flat = np.fromiter(self._frames, float, len(self._frames)).reshape(at.size, -1).T
-        frame = _named(flat, FRAME)
+        frame = _named(_columns(at.size, self._frames), FRAME)
         measured = frame["nis_dof"] > 0.0
         for name in ("nis_dof", "nis", "accepted"):
             log[name][at[measured]] = frame[name][measured]
-        for line in LINES:
+        true_ends, seen_ends = np.array(self._true_ends), np.array(self._seen_ends)
+        for i, line in enumerate(LINES):
             for k, end in enumerate(ENDS):
-                log[f"{line}_true_{end}"][at] = frame[f"{line}_true"][k]
-                log[f"{line}_seen_{end}"][at] = frame[f"{line}_ends"][k]
-        lines = np.stack([frame[f"{line}_line"] for line in LINES])
+                log[f"{line}_true_{end}"][at] = true_ends[:, i, k]
+                log[f"{line}_seen_{end}"][at] = seen_ends[:, i, k]
+        lines = np.array(self._lines)[:, :, :3]
+        lines[frame["late"] > 0.0, 1] = np.nan
         for quantity, column in zip(QUANTITIES, self._vision(lines, frame["roll"]), strict=True):
             log[f"vision_{quantity}"][at] = column
 
     def _vision(self, lines: Array, roll: Array) -> Array:
-        """The poses (6, n) that each frame's lines (3, 3, n) give by themselves, late with the roll as predicted."""
-        left, threshold, right = np.moveaxis(lines, 1, -1)
+        """The poses (6, n) that each frame's lines (n, 3, 3) give by themselves, late with the roll as predicted."""
+        left, threshold, right = np.moveaxis(lines, 1, 0)
         early = three_line_pose(self._camera, left, threshold, right, runway_width=self._width)
         late = two_line_pose(self._camera, left, right, runway_width=self._width, roll=roll)
         x, y, z = early.position.T
@@ -220,8 +217,7 @@ class Recorder:
             return
         at = np.array(self._filter_rows)
         covariance = np.array(self._covariance)
-        values = np.array(self._filter).reshape(at.size, 12)
-        bias, imu_error = values[:, :6], values[:, 6:]
+        bias, imu_error = np.array(self._bias), np.array(self._errors)
         error = np.concatenate(
             (
                 true.position[at] - fused.position[at],
@@ -250,15 +246,6 @@ class Recorder:
             held(f"true_accel_bias_{axis}_mps2", imu_error[:, 3 + i])
             held(f"fused_accel_bias_{axis}_mps2", bias[:, 3 + i])
             held(f"sigma_accel_bias_{axis}_mps2", deviation[:, ACCEL_BIAS.start + i])
-
-
-_NOTHING = (np.nan,) * 4
-_NOT_SEEN = (np.nan,) * 7
-
-
-def _seen(reading: LineReading | None) -> tuple[float, ...]:
-    """A measured line and its ends."""
-    return _NOT_SEEN if reading is None else (reading.a, reading.b, reading.c, *reading.ends)
 
 
 def euler_deg(attitude: Array) -> tuple[Array, Array, Array]:

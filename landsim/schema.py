@@ -172,6 +172,8 @@ class NavigationConfig(Section):
     """Diverged when the filter's own σ of the position passes this."""
     max_rejected_frames: Annotated[int, Field(ge=1)] = 300
     """Diverged when more frames than this in succession do not pass the gate."""
+    handover: Literal["in-view", "latched"] = "in-view"
+    """When three lines are used: whenever the threshold is in view, or until it has once left the image."""
 
 
 class SimulationConfig(Section):
@@ -180,6 +182,8 @@ class SimulationConfig(Section):
     rate_hz: Annotated[float, Field(ge=20.0, le=10000.0)] = 120.0
     """``imu.rate_hz`` must divide it, and ``camera.rate_hz`` must divide both."""
     time_limit_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 120.0
+    end: Literal["stop", "touchdown"] = "stop"
+    """Where a flight ends: at the stop, or at the touchdown, where what comes after is of no interest."""
 
 
 class BoxConfig(Section):

@@ -5,21 +5,24 @@ do.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.random import Generator
+from numpy.typing import NDArray
 
-from estimator.camera import PinholeCamera
-from estimator.lines import line_from_moments
+from estimator import camera as pinhole
+from estimator import lines
+from estimator.camera import Intrinsics, PinholeCamera
+from estimator.compiled import compiled
 from estimator.mount import camera_axes, camera_position
 from estimator.so3 import Array, Vec3
-from estimator.strapdown import ImuNoise, Site, increments
+from estimator.strapdown import ImuNoise, Site, ideal_sample, unpacked
 from landsim.config import CameraConfig, ImuConfig, MountConfig, PitotConfig
 from landsim.earth import MEAN_RADIUS
 from landsim.runway import Runway
-from landsim.state import CameraFrame, ImuSample, LineReading
+from landsim.state import CameraFrame, ImuSample
 from landsim.truth import Truth
 from landsim.units import (
     DEG,
@@ -36,7 +39,8 @@ from landsim.units import (
 BLOCK = 256
 """Samples whose noise is drawn at once."""
 
-PixelSegment = tuple[float, float, float, float]
+LINES = 3
+"""Left edge, threshold, right edge: the order of all that is kept of a frame."""
 
 
 def site_of(runway: Runway) -> Site:
@@ -83,63 +87,56 @@ class Imu:
         self._white = np.repeat((noise.gyro, noise.accel), 3) * math.sqrt(dt)
         self._last_bias = rng.standard_normal(6)
         self._last_bias *= (*[noise.gyro_bias] * 3, *[config.accel_bias_mg * MILLI_G] * 3)
-        self._scale: list[float] = (config.scale_factor * rng.standard_normal(6)).tolist()
+        self._scale = config.scale_factor * rng.standard_normal(6)
         self._rng = rng
-        self._site = site
+        self._site = site.numbers()
         self._count = 0
+        self._last = self._last_bias
         self._draw()
-        self._before = start
-        self._true = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        self._before = start.motion
 
     def _draw(self) -> None:
-        """The biases of the next block of samples, and what bias and white noise add to each."""
+        """The biases of the next block of samples, and their white noise."""
         drift, white = self._rng.standard_normal((2, BLOCK, 6))
-        bias = self._last_bias + np.cumsum(drift * self._drift, axis=0)
-        self._last_bias = bias[-1]
-        self._bias = bias
-        self._added: list[list[float]] = (bias * self._dt + white * self._white).tolist()
+        self._bias = self._last_bias + np.cumsum(drift * self._drift, axis=0)
+        self._last_bias = self._bias[-1]
+        self._noise = white * self._white
 
     def sample(self, truth: Truth) -> ImuSample:
         """The increments since the last call, which was one interval ago."""
-        before, self._before = self._before, truth
-        self._true = (ax, ay, az), (vx, vy, vz) = increments(
-            before.position,
-            before.velocity,
-            before.R_runway_from_body,
-            truth.velocity,
-            truth.R_runway_from_body,
-            self._site,
-            self._dt,
-        )
         if self._count == BLOCK:
             self._draw()
             self._count = 0
-        s0, s1, s2, s3, s4, s5 = self._scale
-        e0, e1, e2, e3, e4, e5 = self._added[self._count]
-        self._count += 1
-        return ImuSample(
-            (ax + s0 * ax + e0, ay + s1 * ay + e1, az + s2 * az + e2),
-            (vx + s3 * vx + e3, vy + s4 * vy + e4, vz + s5 * vz + e5),
+        before, self._before = self._before, truth.motion
+        self._last, sample = _sampled(
+            before, truth.motion, self._site, self._dt, self._scale, self._bias, self._noise, self._count
         )
+        self._count += 1
+        return sample
 
-    def errors(self) -> tuple[float, ...]:
+    def errors(self) -> Array:
         """What the last sample was off by, its white noise apart.
 
         That is the bias, and what the scale factor made of the input.
 
         Returns
         -------
-        (6,) tuple
+        (6,) array
             Gyros (rad/s) and accelerometers (m/s²).
         """
-        (ax, ay, az), (vx, vy, vz) = self._true
-        b0, b1, b2, b3, b4, b5 = self._bias[max(self._count - 1, 0)].tolist()
-        s0, s1, s2, s3, s4, s5 = self._scale
-        k = 1.0 / self._dt
-        return (
-            b0 + k * s0 * ax, b1 + k * s1 * ay, b2 + k * s2 * az,
-            b3 + k * s3 * vx, b4 + k * s4 * vy, b5 + k * s5 * vz,
-        )  # fmt: skip
+        return self._last
+
+
+@compiled
+def _sampled(
+    before: Array, after: Array, site: Array, dt: float, scale: Array, bias: Array, noise: Array, row: int
+) -> tuple[Array, Array]:
+    """The errors of a sample as rates (6,), but for the white noise, and the sample (6,)."""
+    sample, errors = ideal_sample(before, after, site, dt), np.empty(6)
+    for i in range(6):
+        errors[i] = scale[i] * sample[i] / dt + bias[row, i]
+        sample[i] += errors[i] * dt + noise[row, i]
+    return errors, sample
 
 
 def _white(sigma: float, rng: Generator) -> Iterator[float]:
@@ -208,8 +205,11 @@ class View(NamedTuple):
     """One image: what navigation receives, and what there was to see."""
 
     frame: CameraFrame
-    true_ends: tuple[PixelSegment | None, PixelSegment | None, PixelSegment | None]
-    """Left edge, threshold, right edge as projected and clipped, px."""
+    true_ends: Array
+    """(3, 4): u, v of both ends of left edge, threshold and right edge as projected and clipped, px; NaN for a line
+    that is not in the image."""
+    seen_ends: Array
+    """(3, 4): those ends moved onto the fitted lines; NaN for a line that is not reported."""
 
 
 class LineCamera:
@@ -225,105 +225,147 @@ class LineCamera:
     """
 
     def __init__(self, config: CameraConfig, lever: Vec3, runway: Runway, rng: Generator) -> None:
-        self.camera = camera_of(config)
-        self._config = config
-        self._lever = lever
-        self._corners = (*runway.left_edge, *runway.right_edge)
+        camera = self.camera = camera_of(config)
+        self._outages = config.outages_s
+        self._noise_px = config.noise_px
+        self._setup = np.array(
+            (*camera.intrinsics, camera.width, camera.height, config.near_m, config.min_line_px, *lever)
+        )
+        self._corners = np.array((*runway.left_edge, *runway.right_edge))
+        self._spacing = _spacing(config.line_noise, config.point_spacing_px)
         self._rng = rng
-        most = 3 * (int(math.hypot(config.width_px, config.height_px) / config.point_spacing_px) + 3)
-        self._places = np.arange(most, dtype=float)
+        most = int(math.hypot(config.width_px, config.height_px) / config.point_spacing_px) + 3
+        self._noise = np.empty(2 * LINES * most)
 
     def view(self, truth: Truth, tilt: float, tilt_reading: float) -> View:
         """The image at an instant, with the true and the read mount angle (rad)."""
-        near_left, far_left, near_right, far_right = self._in_camera(truth, tilt)
-        ends = (
-            self._seen(near_left, far_left),
-            self._seen(near_left, near_right),
-            self._seen(near_right, far_right),
-        )
+        ends, numbers, total = _ends(self._setup, self._corners, self._spacing, truth.motion, tilt)
         time = truth.time
-        if any(start <= time < end for start, end in self._config.outages_s):
-            return View(CameraFrame(time, None, None, None, tilt_reading), ends)
-        left, threshold, right = self._read(ends)
-        return View(CameraFrame(time, left, threshold, right, tilt_reading), ends)
-
-    def _in_camera(self, truth: Truth, tilt: float) -> list[Vec3]:
-        """The corners of the runway in the camera frame, m."""
-        px, py, pz = camera_position(truth.position, truth.R_runway_from_body, self._lever)
-        (a, b, c), (d, e, f), (g, h, i) = camera_axes(truth.R_runway_from_body, tilt)
-        result = []
-        for corner in self._corners:
-            x, y, z = corner[0] - px, corner[1] - py, corner[2] - pz
-            result.append((a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z))
-        return result
-
-    def _seen(self, start: Vec3, end: Vec3) -> PixelSegment | None:
-        seen = self.camera.clip(start, end, self._config.near_m)
-        if seen is not None and math.hypot(seen[2] - seen[0], seen[3] - seen[1]) >= self._config.min_line_px:
-            return seen
-        return None
-
-    def _read(self, ends: Sequence[PixelSegment | None]) -> list[LineReading | None]:
-        """Lines fitted to noisy points: both ends of each, or points evenly spread between them."""
-        numbers = [0 if seen is None else self._number(seen) for seen in ends]
-        firsts = [0, numbers[0], numbers[0] + numbers[1]]
-        total = sum(numbers)
+        if self._outages and any(start <= time < end for start, end in self._outages):
+            total = 0
         if total == 0:
-            return [None, None, None]
-        # all lines at once: n_u, n_v, i n_u, i n_v, n_u², n_u n_v, n_v² of each point i, with its noise n in units of
-        # σ, summed over the points of each line
-        terms: Array = np.empty((7, total))
-        noise = self._rng.standard_normal(out=terms[:2])
-        np.multiply(noise, self._places[:total], out=terms[2:4])
-        np.multiply(noise, noise[0], out=terms[4:6])
-        np.multiply(noise[1], noise[1], out=terms[6])
-        there = [i for i in range(3) if numbers[i]]
-        sums = np.add.reduceat(terms, [firsts[i] for i in there], axis=1).T.tolist()
-        readings: list[LineReading | None] = [None, None, None]
-        for i, summed in zip(there, sums, strict=True):
-            seen = ends[i]
-            assert seen is not None
-            readings[i] = _fitted(seen, numbers[i], firsts[i], self._config.noise_px, summed)
-        return readings
-
-    def _number(self, seen: PixelSegment) -> int:
-        """How many points a line is fitted to."""
-        if self._config.line_noise == "endpoints":
-            return 2
-        return max(2, int(math.hypot(seen[2] - seen[0], seen[3] - seen[1]) / self._config.point_spacing_px) + 1)
+            return View(CameraFrame(time, _NO_LINES, tilt_reading), ends, _NO_ENDS)
+        noise = self._rng.standard_normal(out=self._noise[: 2 * total])
+        readings, seen = _fitted(ends, numbers, noise, self._noise_px)
+        return View(CameraFrame(time, readings, tilt_reading), ends, seen)
 
 
-def _fitted(seen: PixelSegment, number: int, first: int, sigma: float, sums: Sequence[float]) -> LineReading:
-    """A line fitted to its points.
+_NO_LINES = np.full((LINES, 7), np.nan)
+_NO_ENDS = np.full((LINES, 4), np.nan)
+
+
+def _spacing(line_noise: str, spacing_px: float) -> float:
+    """Between the points of a line, px."""
+    return math.inf if line_noise == "endpoints" else spacing_px
+
+
+def number_of_points(length_px: float, line_noise: str, spacing_px: float) -> int:
+    """How many points a line is fitted to: its two ends, or so many evenly spread between them.
+
+    Parameters
+    ----------
+    length_px : float
+        What is seen of it.
+    line_noise : {"endpoints", "edge-points"}
+    spacing_px : float
+        Between the points, with ``edge-points``; they are spread a little wider to reach both ends.
+    """
+    return _number_of_points(length_px, _spacing(line_noise, spacing_px))
+
+
+@compiled
+def _number_of_points(length: float, spacing: float) -> int:
+    return max(2, int(length / spacing) + 1)
+
+
+_clip = compiled(pinhole.clip)
+_line_from_moments = compiled(lines.line_from_moments)
+
+
+_FROM_TO = ((0, 1), (0, 2), (2, 3))
+"""The corners at which each line begins and ends."""
+
+
+@compiled
+def _ends(
+    setup: Array, corners: Array, spacing: float, motion: Array, tilt: float
+) -> tuple[Array, NDArray[np.int64], int]:
+    """The ends of the lines as `View.true_ends`, how many points each is fitted to, and of all together.
+
+    `setup` is intrinsics, width and height, near plane, shortest line, lever arm; `corners` are near left, far left,
+    near right and far right (m).
+    """
+    camera = Intrinsics(setup[0], setup[1], setup[2], setup[3])
+    body = unpacked(motion)
+    px, py, pz = camera_position(body.position, body.attitude, (setup[8], setup[9], setup[10]))
+    (a, b, c), (d, e, f), (g, h, i) = camera_axes(body.attitude, tilt)
+    ends, numbers, total = np.full((3, 4), np.nan), np.zeros(3, np.int64), 0
+    for line in range(3):
+        first, last = _FROM_TO[line]
+        x, y, z = corners[first, 0] - px, corners[first, 1] - py, corners[first, 2] - pz
+        start = (a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z)
+        x, y, z = corners[last, 0] - px, corners[last, 1] - py, corners[last, 2] - pz
+        end = (a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z)
+        there, u0, v0, u1, v1 = _clip(camera, setup[4], setup[5], start, end, setup[6])
+        length = math.hypot(u1 - u0, v1 - v0)
+        if there and length >= setup[7]:
+            ends[line, 0], ends[line, 1], ends[line, 2], ends[line, 3] = u0, v0, u1, v1
+            numbers[line] = _number_of_points(length, spacing)
+            total += numbers[line]
+    return ends, numbers, total
+
+
+@compiled
+def _fitted(ends: Array, numbers: NDArray[np.int64], noise: Array, sigma: float) -> tuple[Array, Array]:
+    """Lines fitted to their points.
 
     The moments that the fit needs are those of the points, p_i = middle + (i - (N-1)/2) step + σ noise_i, multiplied
     out.
 
     Parameters
     ----------
-    seen : PixelSegment
-        The true ends.
-    number : int
-        Of its points.
-    first : int
-        The i of its first point in the sums.
+    ends : (3, 4) array
+        As `View.true_ends`.
+    numbers : (3,) array
+        Of points of each line; 0 for one that is not there.
+    noise : (2 n,) array
+        Of all points, first in u, then in v, in units of σ.
     sigma : float
         Of the points, px.
-    sums : sequence of float
-        Of n_u, n_v, i n_u, i n_v, n_u², n_u n_v and n_v².
+
+    Returns
+    -------
+    (3, 7), (3, 4) array
+        As `CameraFrame.lines` and `View.seen_ends`.
     """
-    u0, v0, u1, v1 = seen
-    nu, nv, ku, kv, nuu, nuv, nvv = sums
-    middle = first + 0.5 * (number - 1)
-    ku, kv = ku - middle * nu, kv - middle * nv
-    du, dv = (u1 - u0) / (number - 1), (v1 - v0) / (number - 1)
-    places = number * (number * number - 1) / 12.0  # Σ (i - middle)²
+    readings, seen = np.full((3, 7), np.nan), np.full((3, 4), np.nan)
+    first, total = 0, noise.size // 2
     square = sigma * sigma
-    u, v = 0.5 * (u0 + u1) + sigma * nu / number, 0.5 * (v0 + v1) + sigma * nv / number
-    suu = du * du * places + 2.0 * sigma * du * ku + square * (nuu - nu * nu / number)
-    suv = du * dv * places + sigma * (du * kv + dv * ku) + square * (nuv - nu * nv / number)
-    svv = dv * dv * places + 2.0 * sigma * dv * kv + square * (nvv - nv * nv / number)
-    a, b, c, spread = line_from_moments(u, v, suu, suv, svv, math)
-    off0, off1 = a * u0 + b * v0 + c, a * u1 + b * v1 + c
-    ends = (u0 - off0 * a, v0 - off0 * b, u1 - off1 * a, v1 - off1 * b)
-    return LineReading(a, b, c, u, v, spread, number, ends)
+    for line in range(3):
+        number = numbers[line]
+        if number == 0:
+            continue
+        u0, v0, u1, v1 = ends[line, 0], ends[line, 1], ends[line, 2], ends[line, 3]
+        middle = 0.5 * (number - 1)
+        nu = nv = ku = kv = nuu = nuv = nvv = 0.0
+        for i in range(number):
+            a, b, k = noise[first + i], noise[total + first + i], i - middle
+            nu += a
+            nv += b
+            ku += k * a
+            kv += k * b
+            nuu += a * a
+            nuv += a * b
+            nvv += b * b
+        first += number
+        du, dv = (u1 - u0) / (number - 1), (v1 - v0) / (number - 1)
+        places = number * (number * number - 1) / 12.0  # Σ (i - middle)²
+        u, v = 0.5 * (u0 + u1) + sigma * nu / number, 0.5 * (v0 + v1) + sigma * nv / number
+        suu = du * du * places + 2.0 * sigma * du * ku + square * (nuu - nu * nu / number)
+        suv = du * dv * places + sigma * (du * kv + dv * ku) + square * (nuv - nu * nv / number)
+        svv = dv * dv * places + 2.0 * sigma * dv * kv + square * (nvv - nv * nv / number)
+        a, b, c, spread = _line_from_moments(u, v, suu, suv, svv)
+        readings[line] = np.array((a, b, c, u, v, spread, float(number)))
+        off0, off1 = a * u0 + b * v0 + c, a * u1 + b * v1 + c
+        seen[line] = np.array((u0 - off0 * a, v0 - off0 * b, u1 - off1 * a, v1 - off1 * b))
+    return readings, seen

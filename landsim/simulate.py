@@ -17,6 +17,7 @@ from numpy.random import Generator, SeedSequence, default_rng
 
 from estimator.alignment import Incidence
 from estimator.so3 import Array, Vec3, rotate
+from estimator.strapdown import inertial
 from landsim.config import AircraftConfig, Scenario
 from landsim.errors import InputError
 from landsim.guidance import INITIAL, guide, law_of
@@ -207,8 +208,8 @@ def _fly(scenario: Scenario, start: InitialState, seeds: Sequence[SeedSequence],
             if step > 0:
                 sample = imu.sample(truth)
                 navigator.propagate(sample)
-                x, y, z = sample.angle
-                rate, side_force = (x / imu_dt, y / imu_dt, z / imu_dt), sample.velocity[1] / imu_dt
+                x, y, z, _, side, _ = sample.tolist()
+                rate, side_force = (x / imu_dt, y / imu_dt, z / imu_dt), side / imu_dt
         tilt_reading = mount.read()
         if step % frame_every == 0:
             view = camera.view(truth, mount.tilt, tilt_reading)
@@ -225,6 +226,8 @@ def _fly(scenario: Scenario, start: InitialState, seeds: Sequence[SeedSequence],
             mains_down = mains_down or truth.wow_left or truth.wow_right
             if truth.time > faulty + AFTERMATH:
                 return End("fault")
+            if mains_down and settings.end == "touchdown" and faulty == math.inf:
+                return End("touchdown")
         standing = standing + dt if stands(truth) else 0.0
         if standing > STANDSTILL_TIME:
             return End("stopped")
@@ -232,7 +235,7 @@ def _fly(scenario: Scenario, start: InitialState, seeds: Sequence[SeedSequence],
         roll, pitch = navigator.roll_and_pitch()
         plant.feed(rate, side_force, roll, pitch, navigator.airspeed)
         truth = plant.step()
-        if truth.structure_contact or not -truth.position[2] > BELOW_GROUND:  # the latter catches NaN
+        if truth.structure_contact or not -truth.motion[2] > BELOW_GROUND:  # the latter catches NaN
             return _crash(recorder, truth, navigator, command, guidance.phase, airspeed, mount.tilt, tilt_reading)
     return End("timeout")
 
@@ -242,8 +245,9 @@ _ZERO = (0.0, 0.0, 0.0)
 
 def _fault_time(truth: Truth, runway: Runway, wheels: Vec3, mains_down: bool) -> float:
     """The time, if a state on the wheels fails the landing: nose wheel first, or main wheels off the runway."""
-    x, y, _ = rotate(truth.R_runway_from_body, wheels)
-    x, y = x + truth.position[0], y + truth.position[1]
+    position, _, attitude = inertial(truth.motion)
+    x, y, _ = rotate(attitude, wheels)
+    x, y = x + position[0], y + position[1]
     on_it = 0.0 <= x <= runway.length and abs(y) <= 0.5 * runway.width
     mains = truth.wow_left or truth.wow_right
     if (truth.wow_nose and not mains_down) or (mains and not on_it):
@@ -253,12 +257,12 @@ def _fault_time(truth: Truth, runway: Runway, wheels: Vec3, mains_down: bool) ->
 
 def stands(truth: Truth) -> bool:
     """Whether the aircraft stands on its main wheels."""
-    return truth.wow_left and truth.wow_right and math.hypot(truth.velocity[0], truth.velocity[1]) < STANDSTILL
+    return truth.wow_left and truth.wow_right and math.hypot(truth.motion[3], truth.motion[4]) < STANDSTILL
 
 
 def _crash(recorder: Recorder, truth: Truth, *known: Any) -> End:
     """Why the flight is over with this state, which no sensor has to see any more."""
-    if not all(map(math.isfinite, (*truth.position, *truth.velocity, *truth.R_runway_from_body))):
+    if not math.isfinite(truth.motion.sum()):
         return End("error", "JSBSim's state is not finite")
     recorder.step(truth, *known)
     return End("structure_contact" if truth.structure_contact else "below_ground")

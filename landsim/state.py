@@ -1,9 +1,10 @@
 """What is known on board: measurements, the navigation state, the command.  Nothing here is true by construction."""
 
+import math
 from enum import IntEnum
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
-from estimator.so3 import Mat3, Vec3
+from estimator.so3 import Array, Mat3, Vec3
 
 
 class Phase(IntEnum):
@@ -28,13 +29,9 @@ class Stage(IntEnum):
     """Both edges: four numbers, with the filter's roll."""
 
 
-class ImuSample(NamedTuple):
-    """What the inertial unit reports over one of its intervals, at its end."""
-
-    angle: Vec3
-    """Integrated angular rate relative to inertial space, body frame, rad."""
-    velocity: Vec3
-    """Integrated specific force, body frame at the interval's start, m/s."""
+ImuSample: TypeAlias = Array
+"""What the inertial unit reports over one of its intervals, at its end: (6,), integrated angular rate relative to
+inertial space (body frame, rad), integrated specific force (body frame at the interval's start, m/s)."""
 
 
 class LineReading(NamedTuple):
@@ -51,19 +48,21 @@ class LineReading(NamedTuple):
     """Sum of squared distances of the points from their centre, along the line, px²."""
     points: float
     """Number of points."""
-    ends: tuple[float, float, float, float]
-    """u, v of both ends of what was seen, moved onto the fitted line, px."""
 
 
 class CameraFrame(NamedTuple):
-    """One image as navigation receives it: a line that is not in view is None."""
+    """One image as navigation receives it."""
 
     time: float
-    left: LineReading | None
-    threshold: LineReading | None
-    right: LineReading | None
+    lines: Array
+    """(3, 7): left edge, threshold and right edge, each as `LineReading`; NaN for a line that is not in view."""
     tilt: float
     """Mount angle as read, rad, optical axis down from the body's x axis."""
+
+    def reading(self, line: int) -> LineReading | None:
+        """A line by its row; None if it is not in view."""
+        numbers = LineReading(*self.lines[line].tolist())
+        return None if math.isnan(numbers.a) else numbers
 
 
 class NavState(NamedTuple):

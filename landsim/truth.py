@@ -5,7 +5,8 @@ Named tuples and not dataclasses: one is made at every step, and a frozen datacl
 
 from typing import NamedTuple
 
-from estimator.so3 import Mat3, Vec3
+from estimator.so3 import Array, Mat3, Vec3
+from estimator.strapdown import inertial
 
 
 class InitialState(NamedTuple):
@@ -26,12 +27,8 @@ class Truth(NamedTuple):
 
     time: float
     """s since the start."""
-    position: Vec3
-    """Centre of gravity, runway frame, m."""
-    velocity: Vec3
-    """Relative to the ground, runway frame, m/s."""
-    R_runway_from_body: Mat3
-    """Attitude: takes body vectors (forward, right, down) to the runway frame."""
+    motion: Array
+    """(15,): position, velocity and attitude, as `estimator.strapdown.Inertial.numbers` begins; never written to."""
     airspeed: float
     """True airspeed, m/s."""
     wow_nose: bool
@@ -50,3 +47,18 @@ class Truth(NamedTuple):
     """0 to 1."""
     thrust: float
     """N."""
+
+    @property
+    def position(self) -> Vec3:
+        """Centre of gravity, runway frame, m."""
+        return inertial(self.motion).position
+
+    @property
+    def velocity(self) -> Vec3:
+        """Relative to the ground, runway frame, m/s."""
+        return inertial(self.motion).velocity
+
+    @property
+    def R_runway_from_body(self) -> Mat3:
+        """Attitude: takes body vectors (forward, right, down) to the runway frame."""
+        return inertial(self.motion).attitude

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from estimator.so3 import matmul, rotate, transpose
 from landsim import earth
-from landsim.attitude import rotation_at
+from landsim.attitude import runway_attitude
 from landsim.runway import Runway
 from landsim.units import DEG
 
@@ -83,6 +83,6 @@ def test_attitude_is_the_product_of_its_rotations(
     runway = Runway(2000.0, 30.0, heading, latitude, longitude)
     place = 0.99 * latitude + 0.01, longitude - 0.02
     R_runway_from_ned = matmul(runway.R_runway_from_ecef, transpose(earth.ned_from_ecef(*place)))
-    cosine, R = rotation_at(latitude, longitude, heading)(*place, *euler)
+    cosine, R = runway_attitude(latitude, longitude, heading, *place, *euler)
     assert pytest.approx(matmul(R_runway_from_ned, matmul(yaw, matmul(pitch, roll))), abs=1e-14) == R
     assert cosine == pytest.approx(R_runway_from_ned[8], abs=1e-15)

@@ -201,6 +201,19 @@ def test_touchdown_is_the_first_contact() -> None:
     assert -0.02 < before < 0.02, "the wheels were at the ground the step before"
 
 
+def test_a_flight_may_end_at_the_touchdown() -> None:
+    whole, short = fly(), fly(simulation__end="touchdown")
+    assert short.metrics["outcome"] == "landed"
+    assert short.metrics["in_box"]
+    assert short.metrics["stop"] is None
+    assert "stop_cross_max_m" not in short.metrics["box"]
+    assert short.metrics["touchdown"] == whole.metrics["touchdown"]
+    rows = short.log["time_s"].size
+    assert short.log["time_s"][-1] == whole.metrics["touchdown"]["time_s"]
+    for name, values in short.log.items():
+        np.testing.assert_array_equal(values, whole.log[name][:rows], err_msg=name)
+
+
 def test_start_under_the_ground_is_named() -> None:
     flight = fly(0, start__height_m=0.5, start__height_sigma_m=0.0)
     assert flight.metrics["outcome"] == "trim_failed"

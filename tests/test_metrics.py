@@ -180,7 +180,7 @@ def test_a_landing_within_every_limit_is_in_the_box() -> None:
 
 
 def test_an_unknown_end_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"end: 'landed' is not one of stopped, timeout"):
+    with pytest.raises(ValueError, match=r"end: 'landed' is not one of stopped, touchdown"):
         measured(landing(), "landed")
 
 

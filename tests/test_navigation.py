@@ -9,14 +9,16 @@ import pytest
 
 import landsim
 from estimator.alignment import Incidence
+from estimator.covariance import THRESHOLD
+from estimator.fusion import NO_UPDATE, Update
 from estimator.mount import Mount
-from estimator.so3 import IDENTITY
+from estimator.so3 import IDENTITY, Array
 from estimator.strapdown import Inertial, Site
 from landsim.config import CameraConfig, ImuConfig, NavigationConfig, load_aircraft
 from landsim.navigation import Navigator
 from landsim.sensors import camera_of, imu_noise
 from landsim.simulate import incidence_of
-from landsim.state import ImuSample
+from landsim.state import CameraFrame
 
 
 def test_vision_of_perfect_lines_is_the_truth() -> None:
@@ -37,26 +39,52 @@ def test_vision_of_perfect_lines_is_the_truth() -> None:
     assert (across < 1.2 * (h + 225.0 / h) * borrowed + 0.01).all()
 
 
-def test_body_rate_is_less_bias_and_the_turning_earth() -> None:
-    aircraft = load_aircraft("pioneer")
-    site = Site(9.8, (1e-3, -2e-3, 3e-3), 6.4e6)
-    navigator = Navigator(
+def navigator_of(config: NavigationConfig) -> Navigator:
+    """With a rate of 100 Hz, on an Earth that turns about a leaning axis."""
+    return Navigator(
         camera_of(CameraConfig()),
         1.0,
         30.0,
-        site,
+        Site(9.8, (1e-3, -2e-3, 3e-3), 6.4e6),
         imu_noise(ImuConfig()),
         0.01,
         Mount((0.0, 0.0, 0.0), 0.0),
-        NavigationConfig(),
-        incidence_of(aircraft),
+        config,
+        incidence_of(load_aircraft("pioneer")),
     )
+
+
+def test_body_rate_is_less_bias_and_the_turning_earth() -> None:
+    navigator = navigator_of(NavigationConfig())
     still = Inertial((0.0, 0.0, -9.0), (0.0, 0.0, 0.0), IDENTITY)
-    running = SimpleNamespace(gyro_bias=(0.01, 0.02, -0.03), state=still, propagate=lambda *_: None)
+    bias = np.array((0.01, 0.02, -0.03, 0.0, 0.0, 0.0))
+    running = SimpleNamespace(bias=bias, nominal=still.numbers(), state=still, propagate=lambda *_: None)
     navigator.filter = cast("Any", running)
-    navigator.propagate(ImuSample((0.001, 0.002, 0.003), (0.0, 0.0, 0.0)))
+    navigator.propagate(np.array((0.001, 0.002, 0.003, 0.0, 0.0, 0.0)))
     # 0.1, 0.2, 0.3 rad/s as measured
     assert navigator.state(0.0).rate == pytest.approx((0.1 - 0.01 - 0.001, 0.2 - 0.02 + 0.002, 0.3 + 0.03 - 0.003))
+
+
+@pytest.mark.parametrize(("handover", "three_again"), [("in-view", True), ("latched", False)])
+def test_latched_handover_leaves_a_threshold_that_comes_back_alone(handover: str, three_again: bool) -> None:
+    navigator = navigator_of(NavigationConfig.model_validate({"handover": handover}))
+    taken: list[bool] = []
+
+    def observe(lines: Array, _: float) -> Update:
+        taken.append(bool(np.isfinite(lines[THRESHOLD]).all()))
+        return NO_UPDATE
+
+    still = Inertial((0.0, 0.0, -9.0), (0.0, 0.0, 0.0), IDENTITY)
+    running = SimpleNamespace(nominal=still.numbers(), state=still, predict=lambda: None, observe=observe)
+    navigator.filter = cast("Any", running)
+    seen = np.tile((0.0, 1.0, -300.0, 320.0, 300.0, 1e5, 100.0), (3, 1))
+    gone, blind = seen.copy(), np.full((3, 7), np.nan)
+    gone[THRESHOLD] = np.nan
+    results = [navigator.observe(CameraFrame(0.0, lines, 0.05)) for lines in (seen, blind, seen, gone, seen)]
+    # all lines lost is no hand-over: the threshold alone has to leave
+    assert taken == [True, False, True, False, three_again]
+    assert [result.late for result in results] == [False, False, False, not three_again, not three_again]
+    assert math.isnan(results[-1].roll) is three_again
 
 
 def test_incidence_follows_the_trim_table() -> None:

@@ -165,8 +165,8 @@ def test_ideal_imu_reports_what_jsbsim_feels(runway: Runway) -> None:
         sample = imu.sample(plant.step())
         after = felt()
         middle = [0.5 * (a + b) for a, b in zip(before, after, strict=True)]
-        assert [v * RATE for v in sample.velocity] == pytest.approx(middle[:3], abs=0.05)
-        assert [a * RATE for a in sample.angle] == pytest.approx(middle[3:], abs=2e-3)
+        assert [v * RATE for v in sample[3:]] == pytest.approx(middle[:3], abs=0.05)
+        assert [a * RATE for a in sample[:3]] == pytest.approx(middle[3:], abs=2e-3)
         before = after
 
 
@@ -214,7 +214,8 @@ def test_command_and_feed_reach_their_properties() -> None:
 def test_same_inputs_same_bits() -> None:
     flights = [fly(*started(FAR, START._replace(position=(-60.0, 0.0, -4.0))), 8.0, weave) for _ in range(2)]
     assert any(truth.wow_left for truth in flights[0])
-    assert flights[0] == flights[1]
+    one, other = ([np.array((*t[:1], *t.motion, *t[2:])) for t in flown] for flown in flights)
+    assert np.array_equal(one, other)
 
 
 # --- the ground -------------------------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from estimator.innovation import LineObservation, Lines
 from estimator.mount import Mount
-from estimator.so3 import Array, Vec3
+from estimator.so3 import Array
 from estimator.strapdown import ImuNoise, Site
 
 SITE = Site(9.7803, (4.2e-5, -3.1e-5, -5.1e-5), 6_371_000.0)
@@ -153,8 +153,8 @@ class Step:
     """One interval of the inertial unit, and the frame at its end if there is one."""
 
     index: int
-    angle: Vec3
-    push: Vec3
+    sample: Array
+    """(6,): rad and m/s."""
     lines: Lines | None
     tilt: float
     """As read, rad."""
@@ -173,16 +173,15 @@ class Readings:
     """
 
     bias: Array
-    angle: list[Vec3]
-    push: list[Vec3]
+    samples: Array
     frames: list[Lines]
     tilt: list[float]
 
     def steps(self) -> Iterator[Step]:
         """In order of time, from the first interval."""
-        for k in range(1, len(self.angle)):
+        for k in range(1, len(self.samples)):
             frame, rest = divmod(k, EVERY)
-            yield Step(k, self.angle[k], self.push[k], None if rest else self.frames[frame], self.tilt[frame])
+            yield Step(k, self.samples[k], None if rest else self.frames[frame], self.tilt[frame])
 
 
 def readings(rng: Generator) -> Readings:
@@ -201,8 +200,7 @@ def readings(rng: Generator) -> Readings:
     tilt = t.tilt[::EVERY] + TILT_SIGMA * rng.standard_normal(len(frames))
     return Readings(
         bias,
-        [tuple(row) for row in (t.angle + added[:, :3]).tolist()],
-        [tuple(row) for row in (t.push + added[:, 3:]).tolist()],
+        np.hstack((t.angle, t.push)) + added,
         frames,
         tilt.tolist(),
     )

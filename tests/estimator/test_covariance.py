@@ -7,8 +7,6 @@ percentiles           68.27th of the absolute error at four ranges, both reading
 ====================  ============================================================================================
 """
 
-import math
-
 import numpy as np
 import pytest
 from numpy.random import default_rng
@@ -74,7 +72,7 @@ def middle(line: Array, towards: tuple[float, float]) -> Array:
 @pytest.mark.parametrize("line", [LEFT, THRESHOLD, RIGHT])
 def test_equations_by_finite_differences(pose: Poses, line: int) -> None:
     axes = [tuple(row) for row in pose.R.tolist()]
-    predicted = predicted_line(ODD, line, pose.position.tolist(), axes, WIDTH, math)
+    predicted = predicted_line(ODD.intrinsics, line, pose.position.tolist(), axes, WIDTH)
     point, direction = (np.array(vector) for vector in GEOMETRY[line])
     clean = image_line(ODD, pose, point, direction)
     gradient = np.hypot(clean[0], clean[1])
@@ -91,7 +89,7 @@ def test_equations_by_finite_differences(pose: Poses, line: int) -> None:
         return np.array((a * here[0] + b * here[1] + c, a * along[0] + b * along[1]))
 
     offset, angle = derivative(residuals, np.zeros(6), np.repeat((1e-2, 1e-5), 3))
-    equations = line_equations(ODD, line, predicted, axes, here[0], here[1])
+    equations = line_equations(ODD.intrinsics, line, predicted, axes, here[0], here[1])
     # (D × N)·ψ = share of the offset and share of the angle, N·dC = share of the offset - turn·ψ: for a unit of each of
     # dC and ψ
     turned = np.append(np.zeros(3), np.cross(direction, normal))

@@ -93,9 +93,9 @@ def test_angle_variance_of_pure_noise_is_finite_and_large(spread: float | Array)
 
 def test_moments_of_floats_and_arrays_agree() -> None:
     moments = (300.0, 200.0, 1000.0, -400.0, 300.0)
-    one = line_from_moments(*moments, math)
+    one = line_from_moments(*moments)
     u, v, suu, suv, svv = (np.full(3, moment) for moment in moments)
-    many = line_from_moments(u, v, suu, suv, svv, np)
+    many = line_from_moments(u, v, suu, suv, svv)
     for single, array in zip(one, many, strict=True):
         assert array == pytest.approx(np.full(3, single), rel=1e-14)
 
