@@ -219,8 +219,10 @@ def _solve_one(
     if not good:
         nan = np.full((), np.nan)
         return ThreeLinePose(np.full(3, np.nan), np.full((3, 3), np.nan), nan, nan, nan, np.array(False))
-    yaw, pitch, roll = (np.array(angle) for angle in angles(math, d, e, n))
-    return ThreeLinePose(np.array((x, y, z)), np.array((d, e, n)).T, yaw, pitch, roll, np.array(True))
+    yaw, pitch, roll = angles(math, d, e, n)
+    return ThreeLinePose(
+        np.array((x, y, z)), np.array((d, e, n)).T, np.array(yaw), np.array(pitch), np.array(roll), np.array(True)
+    )
 
 
 def check_lines(caller: str, runway_width: ArrayLike, **lines: ArrayLike) -> list[Array]:
@@ -232,7 +234,10 @@ def check_lines(caller: str, runway_width: ArrayLike, **lines: ArrayLike) -> lis
             raise ValueError(f"{caller}: {name} must have the shape (..., 3), not {array.shape}")
         arrays.append(array)
     width = np.asarray(runway_width, dtype=float)
-    if not (width > 0.0).all() or not np.isfinite(width).all():
+    # a single frame costs less than numpy's reductions over a single number
+    if not (0.0 < float(width) < math.inf if width.ndim == 0 else ((width > 0.0) & (width < math.inf)).all()):
         raise ValueError(f"{caller}: runway_width must be finite and above zero, not {runway_width!r}")
-    np.broadcast_shapes(*(a.shape[:-1] for a in arrays), width.shape)
+    shapes = [a.shape[:-1] for a in arrays if a.ndim > 1]
+    if shapes:
+        np.broadcast_shapes(*shapes, width.shape)
     return [*arrays, width]

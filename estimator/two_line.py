@@ -118,10 +118,11 @@ def two_line_pose(
 
 def _solve_one(camera: PinholeCamera, one: list[float], three: list[float], width: float, roll: float) -> TwoLinePose:
     try:
-        *values, good = solve(math, camera.plane_normal(*one), camera.plane_normal(*three), width, roll)
+        yaw, pitch, lateral, height, good = solve(
+            math, camera.plane_normal(*one), camera.plane_normal(*three), width, roll
+        )
     except (ZeroDivisionError, ValueError, OverflowError):
         good = False
     if not good:
-        values = [math.nan] * 4
-    yaw, pitch, lateral, height = (np.array(value) for value in values)
-    return TwoLinePose(yaw=yaw, pitch=pitch, lateral=lateral, height=height, valid=np.array(good))
+        yaw = pitch = lateral = height = math.nan
+    return TwoLinePose(np.array(yaw), np.array(pitch), np.array(lateral), np.array(height), np.array(good))

@@ -176,7 +176,8 @@ class Navigator:
             return None
         p = self.filter.covariance
         sigma2 = float(p[0, 0]) + float(p[1, 1]) + float(p[2, 2])
-        if not math.isfinite(sigma2 + float(self.filter.nominal.sum())):
+        x, y, z = self.filter.nominal[:3].tolist()
+        if not math.isfinite(sigma2 + x + y + z):
             return "its numbers are not finite"
         if sigma2 > self._config.max_position_sigma_m**2:
             return f"its position sigma is {math.sqrt(sigma2):.1f} m"

@@ -7,6 +7,7 @@ afterwards, for all rows at once.
 import contextlib
 from collections.abc import Iterable, Sequence
 from itertools import chain
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -46,16 +47,12 @@ def _columns(rows: int, numbers: Iterable[float]) -> Array:
     return np.fromiter(numbers, float).reshape(rows, -1).T.copy()
 
 
-def _scalars(truth: Truth) -> tuple[float, ...]:
-    """Airspeed, weight on the three wheels, surfaces and throttle."""
-    return (
-        truth.airspeed, truth.wow_nose, truth.wow_left, truth.wow_right,
-        truth.elevator, truth.aileron, truth.rudder, truth.throttle,
-    )  # fmt: skip
+_SCALARS = ("time", "airspeed", "wow_nose", "wow_left", "wow_right", "elevator", "aileron", "rudder", "throttle")
+_scalars = itemgetter(*(Truth._fields.index(name) for name in _SCALARS))
 
 
 def _body(motions: Sequence[Array]) -> Body:
-    rows = np.array(motions)
+    rows = np.concatenate(motions).reshape(len(motions), -1)
     return Body(rows[:, :3], rows[:, 3:6], rows[:, 6:15].reshape(-1, 3, 3))
 
 
@@ -151,12 +148,12 @@ class Recorder:
         true, fused = _body([truth.motion for truth in truths]), _body(self._nominals)
         for known in fused:
             known[ready == 0.0] = np.nan
-        airspeed, *wow, elevator, aileron, rudder, throttle = _columns(
-            self._count, chain.from_iterable(_scalars(t) for t in truths)
+        time, airspeed, *wow, elevator, aileron, rudder, throttle = _columns(
+            self._count, chain.from_iterable(map(_scalars, truths))
         )
         command = dict(zip(Command._fields, _columns(self._count, chain.from_iterable(self._commands)), strict=True))
 
-        log["time_s"] = np.fromiter((t.time for t in truths), float, self._count)
+        log["time_s"] = time
         log["phase"], log["stage"] = phase, stage
         _pose(log, "true", true, self._mount.lever, tilt)
         _pose(log, "fused", fused, self._mount.lever, reading)
