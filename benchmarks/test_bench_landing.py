@@ -13,7 +13,8 @@ from numpy.random import SeedSequence, default_rng
 
 import landsim
 from landsim.plant import Plant
-from landsim.simulate import draw_start, runway_of
+from landsim.scene import runway_of
+from landsim.simulate import draw_start
 
 ROUNDS = 7
 

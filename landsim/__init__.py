@@ -31,6 +31,9 @@ A module imports from those below it only; a contract in the checks holds this.
 ``cli``                              parses arguments and prints; ``tables`` is the table at the end of a flight
 ``report``, ``plots``                pictures; the only ones that import matplotlib
 ``runs``                             run folders, written whole or not at all
+``budget``                           the line precision that bounds ask for, and the ranges from which they hold
+``study``                            errors by range, sampled and flown, against a paper's bounds
+``batch``                            one flight as a row: the pure function of scenario and seed
 ``simulate``, ``recorder``           the loop and what it keeps: the only ones that hold truth and navigation both
 ``modes``                            the aircraft's modes, from JSBSim's own linearisation
 ``plant``                            JSBSim, and the only one that imports it; feet, slugs and degrees end here
@@ -38,12 +41,14 @@ A module imports from those below it only; a contract in the checks holds this.
 ``navigation``                       drives the estimator and its filter
 ``guidance``                         phases and commands, from the navigation state alone
 ``metrics``                          log to touchdown, tracking, navigation errors; pure
+``scene``                            from a scenario's settings to its runway and its aircraft's incidence
 ``config``, ``schema``               TOML to frozen, validated models
 ``resources``                        finds the shipped aircraft and scenarios
 ``log``                              the table of columns; save and load
 ``state``, ``truth``                 what is known on board; what is true
 ``runway``, ``attitude``             the runway on the Earth; attitude in its frame
-``earth``, ``errors``, ``units``     WGS 84; one-line errors; every conversion factor
+``earth``, ``errors``, ``plain``     WGS 84; one-line errors; values as JSON has them
+``units``, ``threads``               every conversion factor; how matrix libraries take their number of threads
 ===================================  ==================================================================================
 """
 

@@ -6,11 +6,12 @@ the commands that need them.
 """
 
 import io
+import itertools
 import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
@@ -19,25 +20,21 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from landsim import __version__
+from landsim.threads import THREAD_VARIABLES
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from landsim.budget.result import Order
     from landsim.config import Scenario
     from landsim.log import Log
+    from landsim.study.model import Envelope
 
 EXIT_FAILURE = 1
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 SEED_DIGITS = 1000
 DEBUG_VARIABLE = "LANDSIM_DEBUG"
-THREAD_VARIABLES = (
-    "OPENBLAS_NUM_THREADS",
-    "OMP_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "BLIS_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-)
 WIDTH = 100
 """Of tables that are not printed to a terminal."""
 
@@ -92,6 +89,10 @@ def check(scenario: str, settings: tuple[str, ...]) -> None:
     from landsim.errors import one_line
 
     loaded, _ = _load(scenario, settings)
+    if loaded.kind == "study":
+        from landsim.study.plan import plan_of
+
+        plan_of(loaded)
     with _printing():
         click.echo(one_line(f"# {loaded.name}: {loaded.path}; aircraft: {loaded.aircraft_config.title}"))
         click.echo(resolved_toml(loaded), nl=False)
@@ -121,25 +122,23 @@ def _seed(context: click.Context, option: click.Parameter, value: str | None) ->
 )
 @click.option("--no-plots", is_flag=True, help="Draw no pictures; landsim plot DIR draws them later.")
 def run(scenario: str, seed: int | None, settings: tuple[str, ...], out: Path | None, no_plots: bool) -> None:
-    """Fly SCENARIO once and keep its log, metrics and pictures.
+    """Fly SCENARIO once and keep its log, metrics and pictures; a study: its verdict and figures.
 
     Of the folder of a run, fly the same again: its scenario, by the same name, with its seed.
     """
     from time import perf_counter
 
-    from landsim.config import ScenarioError
-    from landsim.runs import as_json, new_run, write_run
+    from landsim.plain import as_json
+    from landsim.runs import new_run, write_run
     from landsim.tables import flight_tables
 
     begin = perf_counter()
     loaded, flown_seed = _load(scenario, settings)
-    if loaded.kind != "flight":
-        raise ScenarioError(
-            f'{loaded.path}: kind: must be "flight" to be run, not "{loaded.kind}":'
-            " studies are not built in this version"
-        )
     if seed is None:
         seed = flown_seed or 0
+    if loaded.kind == "study":
+        _run_study(loaded, seed, out, plots=not no_plots)
+        return
     with new_run(loaded.name, out) as place:
         with _status(f"flying {loaded.name}, seed {seed}") as say:
             from landsim.simulate import fly
@@ -166,14 +165,108 @@ def run(scenario: str, seed: int | None, settings: tuple[str, ...], out: Path | 
 @landsim.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 def plot(folder: Path) -> None:
-    """Draw the pictures of the run in DIR again."""
+    """Draw the pictures of the run or the study in DIR again."""
     from landsim.runs import read_run
+    from landsim.study.folder import VERDICT_FILE, read_study
 
-    flown = read_run(folder)
-    with _status("drawing"):
-        paths = _draw(folder, flown.scenario, flown.log, flown.metrics)
+    if (folder / VERDICT_FILE).is_file():
+        study = read_study(folder)
+        with _status("drawing"):
+            paths = _draw_study(folder, study.scenario, study.envelopes, study.verdict)
+    else:
+        flown = read_run(folder)
+        with _status("drawing"):
+            paths = _draw(folder, flown.scenario, flown.log, flown.metrics)
     with _printing(f"{_shown(folder)}: the pictures are there"):
         _echo_paths(folder, sorted(path.name for path in paths))
+
+
+@landsim.command()
+@click.argument("scenario", default="landing")
+@click.option(
+    "--require",
+    "required",
+    multiple=True,
+    metavar="WHAT=BOUND@RANGE",
+    help="A bound on the error of roll, pitch, yaw (degrees), cross, altitude or along (metres), so many metres before"
+    " the threshold (negative past it), as altitude=0.5@600; may be repeated.",
+)
+@click.option(
+    "--requirements", "file", type=click.Path(path_type=Path), metavar="FILE", help="TOML file of such bounds."
+)
+@click.option(
+    "--confidence", type=float, default=95.0, metavar="PERCENT", help="Of frames within a bound.  [default: 95]"
+)
+@click.option(
+    "--precision", type=float, metavar="PX", help="σ of the lines' points: tell from which range on each bound holds."
+)
+@click.option(
+    "--roll-error-deg",
+    type=float,
+    default=0.0,
+    metavar="DEG",
+    help="Of the roll angle given to two lines.  [default: 0]",
+)
+@click.option(
+    "--sweep",
+    "swept",
+    multiple=True,
+    metavar="WHAT[=LOW:HIGH[:N]]",
+    help="Draw what is needed against focal-length, image-size, runway-width, runway-length, tilt, resolution,"
+    " image-width or image-height; may be repeated.  [default: the first five]",
+)
+@click.option(
+    "--confirm", "draws", type=int, default=0, metavar="N", help="Draw each need N times, with real line fits."
+)
+@click.option("--seed", metavar="N", callback=_seed, help="Of the draws.  [default: 0]")
+@set_option
+@click.option(
+    "--plot", "figure", type=click.Path(path_type=Path), metavar="FILE", help="Figure of the sweeps, PNG or PDF."
+)
+@click.option("--json", "as_text", is_flag=True, help="Print JSON in place of the tables.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="New folder for budget.json, budget.png and budget.pdf.",
+)
+def budget(
+    scenario: str,
+    required: tuple[str, ...],
+    file: Path | None,
+    confidence: float,
+    precision: float | None,
+    roll_error_deg: float,
+    swept: tuple[str, ...],
+    draws: int,
+    seed: int | None,
+    settings: tuple[str, ...],
+    figure: Path | None,
+    as_text: bool,
+    out: Path | None,
+) -> None:
+    """Tell what the image lines must be worth for bounds on the pose's errors to hold.
+
+    The camera, the runway and the approach are those of SCENARIO, by default of landing.  To first order, the noise of
+    the lines read in both ways: as that of their two ends, and as that of points along them.
+    """
+    from landsim.budget.order import order_of
+    from landsim.runs import load_flight
+
+    loaded, _ = load_flight(scenario, _overrides(settings))
+    order = order_of(
+        required=required,
+        file=file,
+        confidence_percent=confidence,
+        roll_error_deg=roll_error_deg,
+        precision_px=precision,
+        swept=swept,
+        drawn=figure is not None or out is not None,
+        shown=as_text,
+        draws=draws,
+        seed=seed or 0,
+    )
+    _budget(loaded, order, figure, out, as_text=as_text)
 
 
 def main(arguments: list[str] | None = None) -> NoReturn:
@@ -308,6 +401,106 @@ def _draw(folder: Path, scenario: "Scenario", log: "Log", metrics: dict[str, Any
         raise RunFolderError(f"{folder}: cannot be written: {error.strerror}") from None
 
 
+def _run_study(scenario: "Scenario", seed: int, out: Path | None, *, plots: bool) -> None:
+    """Study, keep and tell; what cannot be studied is refused before anything is written."""
+    from landsim.runs import new_run
+    from landsim.study.folder import write_study
+    from landsim.study.plan import plan_of
+    from landsim.study.run import run_study
+    from landsim.tables import study_tables
+
+    plan_of(scenario)
+    with new_run(scenario.name, out) as place:
+        with _progress(f"{scenario.name}, seed {seed}") as progress:
+            result = run_study(scenario, seed, progress)
+        write_study(place.temporary, scenario, result.verdict, result.envelopes, result.listed, result.rows)
+        if plots:
+            with _status("drawing"):
+                _draw_study(place.temporary, scenario, result.envelopes, result.verdict)
+        names = sorted(path.name for path in place.temporary.iterdir())
+    with _printing(f"{_shown(place.final)}: the study is there"):
+        click.echo(_shown(place.final))
+        console = _console()
+        with console.capture() as text:
+            for table in study_tables(result.verdict, console.width):
+                console.print(table, crop=False)
+        sys.stdout.write(text.get())
+        click.echo(f"studied in {result.verdict['wall_time_s']:.1f} s; written:")
+        _echo_paths(place.final, names)
+
+
+def _draw_study(
+    folder: Path, scenario: "Scenario", envelopes: "Sequence[Envelope]", verdict: dict[str, Any]
+) -> list[Path]:
+    from landsim.errors import RunFolderError
+    from landsim.report import draw_study
+
+    try:
+        return draw_study(folder, scenario, envelopes, verdict)
+    except OSError as error:
+        raise RunFolderError(f"{folder}: cannot be written: {error.strerror}") from None
+
+
+def _budget(scenario: "Scenario", order: "Order", figure: Path | None, out: Path | None, *, as_text: bool) -> None:
+    """Work out, keep and tell; what cannot be written is refused before anything is worked out."""
+    from contextlib import ExitStack
+
+    from landsim.budget import as_dict, make_budget, steps
+    from landsim.budget.order import FIGURES, JSON_FILE, check_figure, to_text
+    from landsim.plain import as_json
+    from landsim.runs import new_run
+    from landsim.tables import budget_tables
+
+    if figure is not None:
+        check_figure(figure)
+    with ExitStack() as stack:
+        place = None if out is None else stack.enter_context(new_run(scenario.name, out))
+        with _progress(f"budget of {scenario.name}") as progress:
+            done = itertools.count(1)
+            made = make_budget(scenario, order, lambda what: progress and progress(next(done), steps(order), what))
+        result = as_json(as_dict(made))
+        paths = [] if figure is None else [figure]
+        if place is not None:
+            _write(place.temporary / JSON_FILE, to_text(result))
+            paths += [place.temporary / name for name in FIGURES]
+        if paths:
+            _draw_budget(result, paths)
+    written = [*([] if figure is None else [figure]), *([] if place is None else [place.final])]
+    with _printing("; ".join(f"{_shown(path)}: the budget is there" for path in written)):
+        if as_text:
+            click.echo(to_text(result), nl=False)
+            return
+        console = _console()
+        with console.capture() as text:
+            for table in budget_tables(result, console.width):
+                console.print(table, crop=False)
+        sys.stdout.write(text.get())
+        for path in written:
+            click.echo(_shown(path))
+        if place is not None:
+            _echo_paths(place.final, [JSON_FILE, *FIGURES])
+
+
+def _write(path: Path, text: str) -> None:
+    from landsim.errors import RunFolderError
+
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise RunFolderError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def _draw_budget(result: dict[str, Any], paths: list[Path]) -> None:
+    from landsim.errors import RunFolderError
+    from landsim.plots.budget import save_budget
+
+    try:
+        with _status("drawing"):
+            save_budget(result, paths)
+    except OSError as error:
+        raise RunFolderError(f"{error.filename or paths[0]}: cannot be written: {error.strerror}") from None
+
+
 def _console(*, stderr: bool = False) -> "Console":
     from rich.console import Console
 
@@ -342,6 +535,25 @@ def _status(text: str) -> "Iterator[Callable[[str], None]]":
 
     with _console(stderr=True).status(Text(text)) as status:
         yield lambda changed: status.update(Text(changed))
+
+
+@contextmanager
+def _progress(text: str) -> "Iterator[Callable[[float, float, str], None] | None]":
+    """A bar that grows with what is done, on a terminal only."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.markup import escape
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
+    with Progress(
+        *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=_console(stderr=True), transient=True
+    ) as bar:
+        task = bar.add_task(escape(text), total=None)
+        yield lambda done, total, what: bar.update(
+            task, completed=done, total=total, description=escape(f"{text}: {what}")
+        )
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from landsim.schema import (
     AircraftFile,
     ApproachConfig,
     ApproachGains,
+    BoundsConfig,
     BoxConfig,
     CameraConfig,
     FlareGains,
@@ -36,6 +37,7 @@ from landsim.schema import (
     SimulationConfig,
     SpeedsConfig,
     StartConfig,
+    StudyConfig,
     field_names,
 )
 
@@ -45,6 +47,7 @@ __all__ = [
     "AircraftFile",
     "ApproachConfig",
     "ApproachGains",
+    "BoundsConfig",
     "BoxConfig",
     "CameraConfig",
     "FlareGains",
@@ -62,6 +65,7 @@ __all__ = [
     "SimulationConfig",
     "SpeedsConfig",
     "StartConfig",
+    "StudyConfig",
     "load_aircraft",
     "load_scenario",
     "parse_setting",
@@ -144,6 +148,7 @@ def resolved_toml(scenario: ScenarioFile) -> str:
     tables = {
         key: value.model_dump(exclude_none=True) if isinstance(value, Section) else value
         for key, value in settings.items()
+        if value is not None
     }
     return tomli_w.dumps(tables)
 

@@ -5,7 +5,6 @@ reserves the place: only one process can.  What a killed process leaves behind i
 """
 
 import json
-import math
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -18,7 +17,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from landsim.config import Scenario, load_scenario, resolved_toml
 from landsim.errors import RunFolderError, is_text, one_line, what_is_wrong
 from landsim.log import COLUMNS, Log, load_log, save_log
+from landsim.plain import as_json
 from landsim.resources import shipped_scenarios
+from landsim.study.folder import VERDICT_FILE, load_study
 
 SCENARIO_FILE = "scenario.toml"
 LOG_FILE = "log.parquet"
@@ -179,12 +180,13 @@ def read_run(folder: Path) -> Run:
 
 
 def load_flight(name_or_path: str, overrides: Mapping[str, object] | None = None) -> tuple[Scenario, int | None]:
-    """A scenario to fly, and the seed to repeat if it was named by the folder of a run.
+    """A scenario to fly or to study, and the seed to repeat if it was named by the folder of a run.
 
     Parameters
     ----------
     name_or_path : str
-        As for `landsim.config.load_scenario`, or a folder that holds a run.  A shipped name wins over a folder.
+        As for `landsim.config.load_scenario`, or a folder that holds a run or a study.  A shipped name wins over a
+        folder.
     overrides : mapping, optional
         As there.
 
@@ -207,6 +209,8 @@ def load_flight(name_or_path: str, overrides: Mapping[str, object] | None = None
         may_hold_a_run = False
     if not may_hold_a_run:
         return load_scenario(name_or_path, overrides), None
+    if (folder / VERDICT_FILE).is_file():
+        return load_study(folder, overrides)
     _must_hold(folder, (SCENARIO_FILE, METRICS_FILE))
     metrics = _read_metrics(folder)
     scenario = load_scenario(folder / SCENARIO_FILE, overrides)
@@ -239,19 +243,6 @@ def _read_metrics(folder: Path) -> dict[str, Any]:
     return metrics
 
 
-def as_json(value: Any) -> Any:
-    """A copy in JSON's own types: numpy scalars and arrays become plain, tuples lists, NaN and infinities None."""
-    if isinstance(value, Mapping):
-        return {str(key): as_json(item) for key, item in value.items()}
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, list | tuple):
-        return [as_json(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
-
-
 def _checked(out: Path) -> Path:
     """The folder to make, links resolved, if a run may be written there."""
     try:
@@ -259,7 +250,7 @@ def _checked(out: Path) -> Path:
         if not is_text(str(final)):  # Parquet and TOML could not say it
             raise RunFolderError(f"{out}: cannot be written: its path must be UTF-8 text")
         if final.is_dir():
-            if any((final / name).exists() for name in FILES):
+            if any((final / name).exists() for name in (*FILES, VERDICT_FILE)):
                 raise RunFolderError(f"{out}: already holds a run; name a new folder")
             if any(final.iterdir()):
                 raise RunFolderError(f"{out}: is not empty; name a new folder")

@@ -8,7 +8,7 @@ nothing else is converted), NaN and infinities are refused.
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -205,6 +205,67 @@ class BoxConfig(Section):
         return self
 
 
+class BoundsConfig(Section):
+    """``[study.bounds]``: the largest error that each quantity is claimed to have; none for one left out."""
+
+    roll_deg: Positive | None = None
+    pitch_deg: Positive | None = None
+    yaw_deg: Positive | None = None
+    cross_m: Positive | None = None
+    altitude_m: Positive | None = None
+    along_m: Positive | None = None
+
+
+class StudyConfig(Section):
+    """``[study]``: the errors of an estimate by range, sampled on a straight approach or taken from flights.
+
+    The straight approach begins at ``start`` (its means) with the camera there, and is flown along
+    ``start.flight_path_deg`` at the approach speed, with no roll and no yaw.
+    """
+
+    method: Literal["sampling", "flights"] = "sampling"
+    """``sampling`` draws the noise of each frame many times; the fused errors come from flights in either case."""
+    stage: Literal["early", "late", "both"] = "early"
+    """Three lines, two lines with a roll angle, or one after the other."""
+    readings: Annotated[
+        tuple[Literal["endpoints", "edge-points"], ...], BeforeValidator(_tuple_from_list), Field(min_length=1)
+    ] = ("endpoints", "edge-points")
+    """Of the noise, each studied in place of ``camera.line_noise``."""
+    pitch_early_deg: Annotated[float, Field(ge=-45.0, le=45.0)] = -3.0
+    """Of the camera to the runway on the straight approach, while the threshold is in the image."""
+    pitch_late_deg: Annotated[float, Field(ge=-45.0, le=45.0)] = -10.0
+    """From when it has left."""
+    end_height_m: Positive = 2.0
+    """Camera height at which the late stage ends."""
+    draws: Annotated[int, Field(ge=100, le=1_000_000)] = 1000
+    """A frame."""
+    ranges_m: Annotated[tuple[float, ...], BeforeValidator(_tuple_from_list), Field(min_length=1)]
+    """Distances to the threshold, negative past it, at which figures are listed."""
+    listed_draws: Annotated[int, Field(ge=100, le=10_000_000)] = 20_000
+    """At each of them."""
+    roll_errors_deg: Annotated[tuple[float, ...], BeforeValidator(_tuple_from_list), Field(min_length=1)] = (0.0,)
+    """By which the roll angle given to the late stage is off."""
+    flights: Annotated[int, Field(ge=0, le=100_000)] = 100
+    """Flown with seeds from the run's own on, for each reading."""
+    bounds: BoundsConfig = Field(default_factory=BoundsConfig)
+    bounds_late: BoundsConfig = Field(default_factory=BoundsConfig)
+    """``[study.bounds_late]``: those that are others in the late stage; each one left out is that of ``bounds``."""
+
+    def bound(self, stage: Literal["early", "late"], key: str) -> float | None:
+        """A bound of a stage by its key, such as ``cross_m``, in the unit that the key says."""
+        late: float | None = getattr(self.bounds_late, key) if stage == "late" else None
+        early: float | None = getattr(self.bounds, key)
+        return early if late is None else late
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        if any(a <= b for a, b in pairwise(self.ranges_m)):
+            raise _refused(f"must fall from each to the next, not {list(self.ranges_m)}", "ranges_m")
+        if self.method == "flights" and self.flights < 2:
+            raise _refused(f'must be at least 2 with method = "flights", not {self.flights}', "flights")
+        return self
+
+
 class ScenarioFile(Section):
     """Everything that a scenario file may say."""
 
@@ -219,9 +280,14 @@ class ScenarioFile(Section):
     navigation: NavigationConfig = Field(default_factory=NavigationConfig)
     simulation: SimulationConfig = Field(default_factory=SimulationConfig)
     box: BoxConfig = Field(default_factory=BoxConfig)
+    study: StudyConfig | None = None
+    """Of the kind ``study`` alone."""
 
     @model_validator(mode="after")
     def _sections_agree(self) -> Self:
+        if (self.kind == "study") != (self.study is not None):
+            wanted = "is missing, which" if self.study is None else "belongs to"
+            raise _refused(f'{wanted} kind = "study"{" needs" if self.study is None else ""}', "study")
         step_rate = self.simulation.rate_hz
         for key, rate in (("imu.rate_hz", self.imu.rate_hz), ("camera.rate_hz", self.camera.rate_hz)):
             steps = step_rate / rate
@@ -370,12 +436,20 @@ class Scenario(ScenarioFile):
     aircraft_config: AircraftConfig
 
 
+def _section_of(annotation: Any) -> type[Section] | None:
+    """The model of a field that holds a table, or may hold one."""
+    for kind in (annotation, *get_args(annotation)):
+        if isinstance(kind, type) and issubclass(kind, Section):
+            return kind
+    return None
+
+
 def field_names(model: type[Section], place: tuple[int | str, ...]) -> list[str]:
     """The keys that are right in the table at a place below a model."""
     for name in place:
         field = model.model_fields.get(str(name))
-        inner = field.annotation if field else None
-        if not (isinstance(inner, type) and issubclass(inner, Section)):
+        inner = _section_of(field.annotation) if field else None
+        if inner is None:
             return []
         model = inner
     return list(model.model_fields)

@@ -15,10 +15,9 @@ from typing import Any, NamedTuple
 
 from numpy.random import Generator, SeedSequence, default_rng
 
-from estimator.alignment import Incidence
 from estimator.so3 import Array, Vec3, rotate
 from estimator.strapdown import inertial
-from landsim.config import AircraftConfig, Scenario
+from landsim.config import Scenario
 from landsim.errors import InputError
 from landsim.guidance import INITIAL, guide, law_of
 from landsim.metrics import flight_metrics
@@ -26,6 +25,7 @@ from landsim.navigation import Navigator, mount_of
 from landsim.plant import Plant, StepError, TrimError
 from landsim.recorder import Recorder
 from landsim.runway import Runway
+from landsim.scene import incidence_of, runway_of
 from landsim.sensors import Imu, LineCamera, Pitot, TiltMount, camera_of, imu_noise, site_of
 from landsim.truth import InitialState, Truth
 from landsim.units import DEG
@@ -54,25 +54,6 @@ class Flight:
 
     metrics: dict[str, Any]
     log: dict[str, Array]
-
-
-def runway_of(scenario: Scenario) -> Runway:
-    """The runway of a scenario."""
-    r = scenario.runway
-    return Runway(
-        length=r.length_m,
-        width=r.width_m,
-        heading=r.heading_deg * DEG,
-        latitude=r.latitude_deg * DEG,
-        longitude=r.longitude_deg * DEG,
-        elevation=r.elevation_m,
-    )
-
-
-def incidence_of(aircraft: AircraftConfig) -> Incidence:
-    """The angle of attack of an aircraft in steady flight."""
-    gains = aircraft.guidance.approach
-    return Incidence(gains.trim_alpha_deg * DEG, gains.trim_alpha_slope_deg_per_mps * DEG, aircraft.speeds.approach_mps)
 
 
 def draw_start(scenario: Scenario, rng: Generator) -> InitialState:

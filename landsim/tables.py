@@ -1,4 +1,7 @@
-"""The tables at the end of a flight, from its metrics; in a narrow terminal their columns go below each other."""
+"""The tables at the end of a flight, from its metrics, and of a study, from its verdict.
+
+In a narrow terminal their columns go below each other.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -162,3 +165,144 @@ def _frames(figures: Mapping[str, Mapping[str, Any]], key: str, what: str = "fra
     """Over how many frames the quantities were counted: a number, or the least and the greatest."""
     counts = sorted({of[key] for of in figures.values() if key in of})
     return f"{' to '.join(map(str, counts[:: len(counts) - 1 or 1]))} {what}"
+
+
+def study_tables(verdict: Mapping[str, Any], width: int = 100) -> "Iterator[RenderableType]":
+    """What holds of the bounds: a table for each stage, source, noise reading and roll error, then the paragraphs.
+
+    Parameters
+    ----------
+    verdict : mapping
+        As in verdict.json.
+    width : int
+        Columns of the terminal, at least ``NARROWEST``: no figure is cut.
+    """
+    from rich.text import Text
+
+    from landsim.study.markdown import groups_of
+
+    yield Text(f"{one_line(verdict['scenario'])}, seed {verdict['seed']}", style="bold")
+    for name, entries in groups_of(verdict):
+        yield Text(f"\n{name}: 95 % of the errors stay below", style="bold")
+        yield from _fitting(_errors(entries), width)
+    for text in verdict["paragraphs"].values():
+        yield Text(f"{text}\n")
+
+
+def _errors(entries: Sequence[Mapping[str, Any]]) -> _Sheet:
+    """The 95th percentiles at the listed ranges, and what becomes of the bound."""
+    from rich.text import Text
+
+    from landsim.study.markdown import needed, said
+    from landsim.study.paragraphs import figure
+
+    ranges = [row["range_m"] for row in entries[0]["listed"]]
+    solved = any(e["precision"] is not None for e in entries)
+    headings = ["", "bound", *(f"{figure(r)} m" for r in ranges), "holds", *(["needs"] if solved else [])]
+    rows: list[list[str | Text]] = []
+    for e in entries:
+        cells: list[str | Text] = [f"{e['quantity']}, {_UNITS[e['unit']]}"]
+        cells.append("–" if e["bound"] is None else figure(e["bound"]))
+        cells += ["–" if row["p95"] is None else figure(row["p95"]) for row in e["listed"]]
+        short = {"holds": "yes", "does not hold": "no"}.get(said(e), said(e))
+        cells.append(Text(short, style="" if e["holds"] is None else "green" if e["holds"] else "red"))
+        rows.append(cells + ([needed(e)] if solved else []))
+    return _Sheet(headings, rows)
+
+
+def budget_tables(budget: Mapping[str, Any], width: int = 100) -> "Iterator[RenderableType]":
+    """What precision of the lines the bounds need, and where they hold with a given one.
+
+    Parameters
+    ----------
+    budget : mapping
+        As in budget.json: None for what does not exist.
+    width : int
+        Columns of the terminal, at least ``NARROWEST``: no figure is cut.
+    """
+    from rich.text import Text
+
+    from landsim.budget.words import binding_text, setting_text
+
+    percent = f"{budget['confidence_percent']:g} %"
+    yield Text(f"{one_line(budget['scenario'])}: bounds kept in {percent} of the frames, to first order", style="bold")
+    yield Text(setting_text(budget))
+    if any(requirement["stage"] for requirement in budget["requirements"]):
+        sheet = _needs(budget)
+        yield from _fitting(sheet, width)
+        yield Text(sheet.note, style="dim")
+        yield Text(binding_text(budget) + "\n")
+    if "precision" in budget:
+        sheet = _held(budget)
+        yield from _fitting(sheet, width)
+        yield Text(sheet.note + "\n", style="dim")
+
+
+def _needs(budget: Mapping[str, Any]) -> _Sheet:
+    """The precision that each requirement with a range needs of each reading."""
+    from rich.text import Text
+
+    from landsim.budget.words import amount, reference_px, requirement_text, unit_of
+    from landsim.study.model import READINGS
+
+    drawn, there, noise = "confirmed" in budget, reference_px(budget), budget["camera"]["noise_px"]
+    headings = ["requirement", "stage", "keeps now", "needs σ", *(["drawn"] if drawn else [])]
+    headings += ["or points", "now"]
+    rows: list[list[str | Text]] = []
+    finer = False
+    for requirement in budget["requirements"]:
+        if requirement["stage"] is None:
+            continue
+        unit = unit_of(requirement)
+        name, stage = requirement_text(requirement), requirement["stage"]
+        for reading in READINGS:
+            of = requirement[reading]
+            needed, points = of["needed_noise_px"], of.get("needed_points")
+            enough = needed is not None and there <= needed
+            cells: list[str | Text] = [f"{name}, {reading}", stage, amount(of[f"present_{unit}"], unit, ".3g")]
+            cells.append(Text("none" if needed is None else f"{needed:.3g} px", style="green" if enough else "red"))
+            if drawn:
+                cells.append(f"{of['inside_percent']:.1f} %" if "inside_percent" in of else "–")
+            if points:
+                closer = of["needed_spacing_px"] < 1.0
+                finer |= closer
+                cells += [
+                    "/".join(map(str, points)) + ("*" if closer else ""),
+                    "/".join(map(str, of["present_points"])),
+                ]
+            else:
+                cells += ["", ""]
+            rows.append(cells)
+    note = (
+        f"now: σ = {noise:.3g} px; points: a line, of that σ, on left edge/threshold/right edge, late on the two edges"
+    )
+    note += "; * closer than a pixel to each other" if finer else ""
+    if drawn:
+        note += f"; drawn: of {budget['confirmed']['draws']} draws with the σ needed, so many were within the bound"
+    return _Sheet(headings, rows, note)
+
+
+def _held(budget: Mapping[str, Any]) -> _Sheet:
+    """Where each bound holds with the precision given."""
+    from landsim.budget.words import requirement_text, signed
+
+    precision = budget["precision"]
+    rows: list[list[str]] = []
+    for requirement in budget["requirements"]:
+        cells = [requirement_text(requirement)]
+        for reading in ("endpoints", "edge-points"):
+            stretches = [
+                f"{signed(of['from_m'], '.4g')} … {signed(of['to_m'], '.4g')} m" for of in requirement[reading]["holds"]
+            ]
+            cells.append("\n".join(stretches) or "nowhere")
+        rows.append(cells)
+    note = "the lines are never all in the image"
+    if precision["far_m"] is not None:
+        note = f"looked at from {signed(precision['far_m'], '.4g')} m to {signed(precision['end_m'], '.4g')} m; "
+        if precision["hand_over_m"] is None:
+            note += "the threshold, and with it roll and along, is never in the image"
+        else:
+            over = signed(precision["hand_over_m"], ".4g")
+            note += f"the threshold leaves the image at {over} m, and with it roll and along"
+    px = f"{precision['noise_px']:.3g} px"
+    return _Sheet(("requirement", f"endpoints\nholds with {px}", f"edge-points\nholds with {px}"), rows, note)

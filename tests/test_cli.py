@@ -17,8 +17,10 @@ from rich.console import Console
 
 from landsim import __version__, cli
 from landsim.config import load_scenario
-from landsim.runs import as_json, read_run
+from landsim.plain import as_json
+from landsim.runs import read_run
 from landsim.tables import flight_tables, number
+from landsim.threads import THREAD_VARIABLES
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 Run = Callable[..., tuple[int, str, str]]
@@ -30,7 +32,7 @@ def landsim(
 ) -> Run:
     """Runs a command line in an empty folder, without flying: exit code, stdout, stderr."""
     monkeypatch.chdir(tmp_path)
-    for variable in cli.THREAD_VARIABLES:
+    for variable in THREAD_VARIABLES:
         monkeypatch.setenv(variable, "1")
 
     def run(*arguments: str) -> tuple[int, str, str]:
@@ -186,7 +188,7 @@ TOLD = {
     "not a number": "override start.height_m: must be a finite number, not nan",
     "zero focal length": "override camera.focal_length_mm: must be above 0, not 0.0",
     "unknown aircraft": "override aircraft.name: no aircraft \"pionier\": neither a folder nor a shipped name; did you",
-    "a study": 'kind: must be "flight" to be run, not "study": studies are not built in this version',
+    "a study": 'study: is missing, which kind = "study" needs',
     "negative seed": "'--seed': must be a whole number, 0 or more, not -1",
     "fractional seed": "'--seed': must be a whole number, 0 or more, not 1.5",
     "seed is a word": "'--seed': must be a whole number, 0 or more, not x",
@@ -390,7 +392,9 @@ class TestOtherCommands:
     def test_list(self, landsim: Run) -> None:
         code, out, err = landsim("list")
         assert (code, err) == (0, "")
-        assert "  landing  One landing in calm air" in out
+        told = [line.split(maxsplit=1) for line in out.splitlines() if line.startswith("  ")]
+        assert dict(told)["landing"].startswith("One landing in calm air")
+        assert dict(told)["paper-fig3"].startswith("The paper's Fig. 3")
         assert "  pioneer  " in out
 
     def test_check_prints_a_file_that_loads_to_the_same(self, landsim: Run, tmp_path: Path) -> None:
@@ -400,8 +404,10 @@ class TestOtherCommands:
         (tmp_path / "again.toml").write_text(out)
         assert load_scenario(tmp_path / "again.toml").camera == load_scenario("landing", {"camera.rate_hz": 15}).camera
 
-    def test_check_takes_a_study(self, landsim: Run) -> None:
-        assert landsim("check", "landing", "--set", "kind=study")[0] == 0
+    def test_check_takes_a_study(self, tmp_path: Path) -> None:
+        code, out, _ = process("check", "paper-fig3", cwd=tmp_path)
+        assert code == 0
+        assert tomllib.loads(out)["study"]["draws"] == 1000
 
     def test_plot_draws_into_the_run(self, landsim: Run, tmp_path: Path) -> None:
         landsim("run", "landing", "--out", "mine", "--no-plots")

@@ -12,9 +12,11 @@ from pydantic import ValidationError
 
 from landsim.config import (
     AircraftFile,
+    BoundsConfig,
     Scenario,
     ScenarioError,
     ScenarioFile,
+    StudyConfig,
     load_aircraft,
     load_scenario,
     parse_setting,
@@ -61,11 +63,34 @@ class TestShipped:
         with shipped_scenarios()["landing"].open("rb") as file:
             written = keys_of(tomllib.load(file))
         loaded = load_scenario("landing")
-        assert set(settings_of(loaded)) - written == {"start.speed_mps"}  # TOML cannot say "none"
+        assert set(settings_of(loaded)) - written == {"start.speed_mps", "study"}  # TOML cannot say "none"
         for key in ScenarioFile.model_fields:
-            if key not in {"kind", "aircraft"}:
+            if key not in {"kind", "aircraft", "study"}:
                 section = getattr(loaded, key)
                 assert section == type(section)()
+
+    def test_the_paper_s_studies_explain_every_key_of_a_study(self) -> None:
+        written: set[str] = set()
+        for name in ("paper-fig3", "paper-fig4", "paper-flight"):
+            with shipped_scenarios()[name].open("rb") as file:
+                written |= keys_of(tomllib.load(file)["study"])
+        bounds = {f"bounds.{key}" for key in BoundsConfig.model_fields}
+        assert {key for key in StudyConfig.model_fields if not key.startswith("bounds")} | bounds <= written
+
+    @pytest.mark.parametrize("name", ["paper-fig3", "paper-fig4", "paper-flight"])
+    def test_the_studies_are_the_paper_s(self, name: str) -> None:
+        s = load_scenario(name)
+        assert s.kind == "study"
+        assert (s.start.along_m, s.start.cross_m, s.start.height_m, s.start.speed_mps) == (-1000.0, 0.0, 60.0, 40.0)
+        assert (s.start.flight_path_deg, s.runway.width_m) == (-3.0, 30.0)
+        assert (s.camera.focal_length_mm, s.camera.pixel_um) == (12.5, 9.9)
+        assert (s.camera.width_px, s.camera.height_px, s.camera.rate_hz) == (658, 494, 30.0)
+        assert s.camera.noise_px**2 == pytest.approx(2.0)
+        assert (s.navigation.handover, s.simulation.end) == ("latched", "touchdown")
+        study = s.study
+        assert study is not None
+        assert (study.pitch_early_deg, study.pitch_late_deg, study.end_height_m) == (-3.0, -10.0, 2.0)
+        assert (study.flights, set(study.readings)) == (100, {"endpoints", "edge-points"})
 
     def test_landing_is_the_flight_of_the_paper(self) -> None:
         s = load_scenario("landing")
@@ -156,6 +181,8 @@ REFUSED: list[tuple[str, object, str]] = [
     ("start.along_m", 0.0, "override start.along_m: must be below 0, not 0.0"),
     ("start.height_m", 0.0, "override start.height_m: must be above 0, not 0.0"),
     ("box.along_max_m", 50.0, "override box.along_max_m: must be above along_min_m = 100, not 50"),
+    ("kind", "study", 'study: is missing, which kind = "study" needs'),
+    ("study.ranges_m", [1.0], 'study: belongs to kind = "study"'),
     ("kind", "flihgt", 'override kind: must be "flight" or "study", not "flihgt"; did you mean "flight"?'),
     ("aircraft.name", "pionere", 'no aircraft "pionere": neither a folder nor a shipped name; did you mean pioneer?'),
     ("aircraft.name", "", "override aircraft.name: "),
@@ -163,7 +190,30 @@ REFUSED: list[tuple[str, object, str]] = [
 ]
 
 
+REFUSED_STUDY: list[tuple[str, object, str]] = [
+    ("study.darws", 1000, "override study.darws: unknown key; did you mean study.draws?"),
+    ("study.bounds.cros_m", 1.0, "override study.bounds.cros_m: unknown key; did you mean study.bounds.cross_m?"),
+    ("study.ranges_m", [100.0, 100.0], "override study.ranges_m: must fall from each to the next, not [100.0, 100.0]"),
+    ("study.ranges_m", [], "override study.ranges_m: must have 1 elements, not 0"),
+    ("study.readings", ["corner"], 'override study.readings.0: must be "endpoints" or "edge-points", not "corner"'),
+    ("study.draws", 99, "override study.draws: must be at least 100, not 99"),
+    ("study.bounds.yaw_deg", 0.0, "override study.bounds.yaw_deg: must be above 0, not 0.0"),
+    ("study.stage", "midle", 'override study.stage: must be "early", "late" or "both", not "midle"'),
+    ("study", 3, "override study: must be a table, not 3"),
+]
+
+
 class TestRefused:
+    @pytest.mark.parametrize(("key", "value", "told"), REFUSED_STUDY, ids=[k for k, _, _ in REFUSED_STUDY])
+    def test_override_of_a_study(self, key: str, value: object, told: str) -> None:
+        with pytest.raises(ScenarioError) as caught:
+            load_scenario("paper-fig3", {key: value})
+        assert told in str(caught.value)
+
+    def test_flights_that_are_none(self) -> None:
+        with pytest.raises(ScenarioError, match=r'study\.flights: must be at least 2 with method = "flights", not 1'):
+            load_scenario("paper-flight", {"study.flights": 1})
+
     @pytest.mark.parametrize(("key", "value", "told"), REFUSED, ids=[f"{k}={str(v)[:9]}" for k, v, _ in REFUSED])
     def test_override(self, key: str, value: object, told: str, tmp_path: Path) -> None:
         assert told in refusal(tmp_path, MINIMAL, {key: value})
@@ -216,11 +266,11 @@ class TestRefused:
         assert str(caught.value) == told
 
     def test_every_key_is_recognised_with_a_letter_missing(self) -> None:
-        for key in settings_of(load_scenario("landing")):
+        for key in settings_of(load_scenario("paper-fig3")):
             *section, name = key.split(".")
             misspelt = ".".join([*section, name[:2] + name[3:]])
             with pytest.raises(ScenarioError) as caught:
-                load_scenario("landing", {misspelt: 1})
+                load_scenario("paper-fig3", {misspelt: 1})
             assert f"{misspelt}: unknown key; did you mean {key}?" in str(caught.value)
 
     @given(content=st.one_of(st.binary(max_size=60), st.text(max_size=60).map(str.encode)))
@@ -250,7 +300,6 @@ VALUES: dict[str, st.SearchStrategy[object]] = {
     "camera.rate_hz": st.integers(1, 120).map(lambda n: 120.0 / n),
     "imu.scale_factor": _finite(0.0, 0.49),
     "navigation.start_frames": st.integers(2, 1000),
-    "kind": st.sampled_from(["flight", "study"]),
 }
 
 
@@ -265,9 +314,38 @@ class TestRoundTrip:
         assert again.aircraft_config == scenario.aircraft_config
         assert settings_of(scenario).keys() >= overrides.keys()
 
-    def test_resolved_says_every_key(self) -> None:
-        scenario = load_scenario("landing", {"start.speed_mps": 39.0})
-        assert keys_of(tomllib.loads(resolved_toml(scenario))) == set(settings_of(scenario))
+    @pytest.mark.parametrize(
+        ("name", "overrides", "none"),
+        [
+            ("landing", {"start.speed_mps": 39.0}, {"study"}),
+            ("paper-fig3", {}, {f"study.bounds_late.{key}" for key in BoundsConfig.model_fields}),
+        ],
+    )
+    def test_resolved_says_every_key(self, name: str, overrides: dict[str, object], none: set[str]) -> None:
+        scenario = load_scenario(name, overrides)
+        assert keys_of(tomllib.loads(resolved_toml(scenario))) == set(settings_of(scenario)) - none
+
+    @given(
+        overrides=st.fixed_dictionaries(
+            {},
+            optional={
+                "study.stage": st.sampled_from(["early", "late", "both"]),
+                "study.readings": st.sampled_from([["endpoints"], ["edge-points", "endpoints"]]),
+                "study.ranges_m": st.lists(_finite(-1e5, 1e5), unique=True, min_size=1, max_size=5).map(
+                    lambda ranges: sorted(ranges, reverse=True)
+                ),
+                "study.roll_errors_deg": st.lists(_finite(-20.0, 20.0), min_size=1, max_size=3),
+                "study.flights": st.integers(0, 100_000),
+                "study.bounds.cross_m": _finite(1e-6, 1e6),
+                "study.bounds_late.yaw_deg": _finite(1e-6, 90.0),
+            },
+        )
+    )
+    def test_a_resolved_study_loads_to_the_same(self, overrides: dict[str, object], tmp_path: Path) -> None:
+        scenario = load_scenario("paper-fig4", overrides)
+        path = tmp_path / "resolved.toml"
+        path.write_text(resolved_toml(scenario), encoding="utf-8")
+        assert settings_of(load_scenario(path)) == settings_of(scenario)
 
 
 class TestAircraft:

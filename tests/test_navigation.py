@@ -16,8 +16,8 @@ from estimator.so3 import IDENTITY, Array
 from estimator.strapdown import Inertial, Site
 from landsim.config import CameraConfig, ImuConfig, NavigationConfig, load_aircraft
 from landsim.navigation import Navigator
+from landsim.scene import incidence_of
 from landsim.sensors import camera_of, imu_noise
-from landsim.simulate import incidence_of
 from landsim.state import CameraFrame
 
 

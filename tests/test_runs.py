@@ -15,7 +15,8 @@ from conftest import FakeFlight, fake_flight
 from landsim.config import load_scenario
 from landsim.errors import RunFolderError, ScenarioError
 from landsim.log import load_log
-from landsim.runs import as_json, load_flight, new_run, read_run, write_run
+from landsim.plain import as_json
+from landsim.runs import load_flight, new_run, read_run, write_run
 
 
 def tree(folder: Path) -> list[str]:

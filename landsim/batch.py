@@ -1,0 +1,352 @@
+"""Many flights of one scenario: a flight as a row of numbers, rows from any executor, and rows as Parquet.
+
+``flight_row`` is a pure function of scenario and seed, but for the wall time that it reports.  A row has what a flight
+was worth as scalars, and its navigation errors by distance to the threshold as arrays, so that flights that are flown
+at different speeds can be laid over each other.
+"""
+
+import math
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from estimator.so3 import Array
+from landsim.config import Scenario
+from landsim.errors import InputError, RunFolderError
+from landsim.log import QUANTITIES, Log
+from landsim.metrics import CRASHES, EARLY_NUMBERS, LATE_NUMBERS, error
+from landsim.simulate import Flight, fly
+from landsim.state import Stage
+from landsim.threads import THREAD_VARIABLES
+
+Row: TypeAlias = dict[str, Any]
+
+STEP = 10.0
+"""Of the grid of distances, m."""
+BEYOND = 300.0
+"""The grid goes on for so far past the threshold, m."""
+REACH = 0.5 * STEP
+"""A flight that begins nearer than a distance by more than this has no frame for it, m."""
+
+START = ("along_m", "cross_m", "height_m", "heading_deg", "speed_mps")
+TOUCHDOWN = ("x_m", "y_m", "sink_rate_mps", "ground_speed_mps", "pitch_deg", "bank_deg", "heading_error_deg")
+TRACKING = ("glide_slope_m", "localizer_m", "glide_slope_to_flare_m")
+ESTIMATES = ("vision", "fused")
+
+
+def _stated(name: str, what: str) -> str:
+    """``cross_m`` and ``rms`` to ``cross_rms_m``: the unit stays at the end."""
+    stem, unit = name.rsplit("_", 1)
+    return f"{stem}_{what}_{unit}"
+
+
+SCALARS: dict[str, type] = {
+    "seed": int,
+    "line_noise": str,
+    "outcome": str,
+    "in_box": bool,
+    "reason": str,
+    "end": str,
+    **{f"start_{name}": float for name in START},
+    **dict.fromkeys(TOUCHDOWN, float),
+    "touchdown_time_s": float,
+    "bounces": int,
+    "stop_x_m": float,
+    "stop_y_m": float,
+    "stop_time_s": float,
+    **{_stated(name, of): float for name in TRACKING for of in ("rms", "p95")},
+    **{f"{source}_{_stated(q, of)}": float for source in ESTIMATES for q in QUANTITIES for of in ("rms", "p95")},
+    "flight_time_s": float,
+    "wall_time_s": float,
+}
+"""The scalars of a row and their types, in order; each may be None.  The touchdown's have the names of metrics.json."""
+ARRAYS: tuple[str, ...] = (
+    "distance_m",
+    "time_s",
+    "stage",
+    *(f"true_{q}" for q in QUANTITIES),
+    *(f"vision_error_{q}" for q in QUANTITIES),
+    *(f"fused_error_{q}" for q in QUANTITIES),
+    *(f"sigma_{q}" for q in QUANTITIES),
+)
+"""The arrays of a row, in order, (n,) floats each; NaN where there is nothing."""
+
+
+def distances_of(scenario: Scenario) -> Array:
+    """Distances to the threshold (n,), m, falling, at which a row of a scenario has its errors.
+
+    They are those divisible by `STEP`, from the start to `BEYOND` past the threshold, where they are negative, and the
+    study's own, if the scenario has a study.
+    """
+    first, last = math.floor(-scenario.start.along_m / STEP), -math.floor(BEYOND / STEP)
+    grid = STEP * np.arange(last, first + 1)
+    ranges = () if scenario.study is None else scenario.study.ranges_m
+    return np.asarray(np.unique(np.append(grid, ranges))[::-1])
+
+
+def flight_row(scenario: Scenario, seed: int, distances: ArrayLike | None = None) -> Row:
+    """Fly a scenario once, and say in one row what came of it.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Of the kind ``flight``.
+    seed : int
+        Not negative.
+    distances : (n,) array_like, optional
+        To the threshold, m; without them, those of `distances_of`.
+
+    Returns
+    -------
+    dict
+        `SCALARS` and `ARRAYS`, every one of them in every row.  At each distance stand the numbers of the first camera
+        frame at or past it: ``vision_error_*`` of the pose that its lines alone give and ``fused_error_*`` of the
+        filter after it, estimate less true, ``sigma_*`` the filter's own, ``true_*`` the camera's pose, and as
+        ``stage`` what the frame offered, whether the filter believed it or not: 1 three lines, 2 two, 0 less.  An
+        exception in the flight makes a row with the outcome ``error``.
+
+    Raises
+    ------
+    InputError
+        If the aircraft's model does not load.
+    ValueError
+        If the scenario is not a flight, or the seed is not a whole number of zero or more.
+    """
+    if scenario.kind != "flight":
+        raise ValueError(f"{scenario.name}: a scenario of the kind {scenario.kind!r} is not flown")
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise ValueError(f"seed must be a whole number that is not negative, not {seed!r}")
+    at = np.asarray(distances_of(scenario) if distances is None else distances, dtype=float)
+    try:
+        return row_of(scenario, fly(scenario, seed), at)
+    except InputError:
+        raise
+    except Exception as failure:  # noqa: BLE001 - one flight must not take the others with it, and its row says why
+        lost: Row = dict.fromkeys(SCALARS)
+        lost |= {"seed": seed, "line_noise": scenario.camera.line_noise, "in_box": False}
+        lost |= {"outcome": "error", "end": "error", "reason": f"{type(failure).__name__}: {failure}"}
+        return lost | {name: np.full(at.size, np.nan) for name in ARRAYS} | {"distance_m": at}
+
+
+def row_of(scenario: Scenario, flight: Flight, distances: Array) -> Row:
+    """The row of a flight that has been flown; parameters and result as for `flight_row`."""
+    metrics = flight.metrics
+    touchdown, stop = metrics["touchdown"] or {}, metrics["stop"] or {}
+    row: Row = {
+        "seed": metrics["seed"],
+        "line_noise": scenario.camera.line_noise,
+        **{name: metrics[name] for name in ("outcome", "in_box", "reason", "end")},
+        **{f"start_{name}": metrics["start"].get(name) for name in START},
+        **{name: touchdown.get(name) for name in TOUCHDOWN},
+        "touchdown_time_s": touchdown.get("time_s"),
+        "bounces": metrics["bounces"],
+        **{f"stop_{name}": stop.get(name) for name in ("x_m", "y_m", "time_s")},
+        **{_stated(name, of): metrics["tracking"][name][of] for name in TRACKING for of in ("rms", "p95")},
+        **{
+            f"{source}_{_stated(q, of)}": metrics["navigation"][source][q][of]
+            for source in ESTIMATES
+            for q in QUANTITIES
+            for of in ("rms", "p95")
+        },
+        "flight_time_s": metrics["flight_time_s"],
+        "wall_time_s": metrics["wall_time_s"],
+    }
+    every = round(scenario.simulation.rate_hz / scenario.camera.rate_hz)
+    return row | by_distance(flight.log, distances, every, crashed=metrics["end"] in CRASHES)
+
+
+def by_distance(log: Log, distances: Array, every: int, *, crashed: bool = False) -> dict[str, Array]:
+    """The arrays of a row.
+
+    Parameters
+    ----------
+    log : mapping of str to (n,) array
+        The columns of ``landsim.log.COLUMNS``; n may be 0.
+    distances : (m,) array
+        To the threshold, m.
+    every : int
+        Rows from one camera frame to the next.
+    crashed : bool
+        Whether the last row is that of a crash, which no camera sees any more.
+
+    Returns
+    -------
+    dict of str to (m,) array
+        `ARRAYS`.
+    """
+    frames = np.arange(0, log["time_s"].size - crashed, every)
+    passed = np.maximum.accumulate(log["true_along_m"][frames])
+    nearest = np.searchsorted(passed, -distances)
+    there = nearest < frames.size
+    if frames.size:
+        there &= (nearest > 0) | (distances <= REACH - passed[0])
+    rows = frames[nearest[there]]
+
+    def at(values: Array) -> Array:
+        result = np.full(distances.size, np.nan)
+        result[there] = values[rows]
+        return result
+
+    return {
+        "distance_m": distances.copy(),
+        "time_s": at(log["time_s"]),
+        "stage": at(_offered(log)),
+        **{f"true_{q}": at(log[f"true_{q}"]) for q in QUANTITIES},
+        **{f"{source}_error_{q}": at(error(log, source, q)) for source in ESTIMATES for q in QUANTITIES},
+        **{f"sigma_{q}": at(log[f"sigma_{q}"]) for q in QUANTITIES},
+    }
+
+
+def _offered(log: Log) -> Array:
+    """What each row's frame offered to the filter, as a number of `landsim.state.Stage`.
+
+    The log's own stage is 0 where the gate refused a frame; to leave those out would take the worst of vision away.
+    Before the filter starts, frames with three lines are those from which it does.
+    """
+    three = np.all([np.isfinite(log[f"{line}_seen_u0"]) for line in ("left", "threshold", "right")], axis=0)
+    offered = log["nis_dof"]
+    waiting = np.isnan(log["fused_along_m"]) | (np.isnan(offered) & (log["stage"] == Stage.EARLY))
+    early = (offered == EARLY_NUMBERS) | (three & waiting)
+    return np.select([early, offered == LATE_NUMBERS], [float(Stage.EARLY), float(Stage.LATE)], float(Stage.NONE))
+
+
+def fly_rows(
+    scenario: Scenario,
+    seeds: Sequence[int],
+    executor: Executor | None = None,
+    progress: Callable[[Row], None] | None = None,
+    distances: ArrayLike | None = None,
+) -> list[Row]:
+    """Fly a scenario once for each seed.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Of the kind ``flight``.
+    seeds : sequence of int
+    executor : concurrent.futures.Executor, optional
+        Of any make, such as `workers` yields; without it the flights are flown here, one after the other.
+    progress : callable, optional
+        Is given each row when it is finished, in any order.
+    distances : (n,) array_like, optional
+        As for `flight_row`.
+
+    Returns
+    -------
+    list of dict
+        In the order of the seeds, whoever flew them.
+
+    Raises
+    ------
+    InputError, ValueError
+        As `flight_row` does; what has not begun then is not flown.
+    """
+    if executor is None:
+        rows = []
+        for seed in seeds:
+            rows.append(flight_row(scenario, seed, distances))
+            if progress is not None:
+                progress(rows[-1])
+        return rows
+    futures: list[Future[Row]] = []
+    try:
+        futures += (executor.submit(flight_row, scenario, seed, distances) for seed in seeds)
+        for future in as_completed(futures):
+            row = future.result()
+            if progress is not None:
+                progress(row)
+        return [future.result() for future in futures]
+    except BaseException:
+        for future in futures:
+            future.cancel()
+        raise
+
+
+@contextmanager
+def workers(count: int) -> Iterator[ProcessPoolExecutor]:
+    """A pool of processes for `fly_rows`, each with the matrix libraries on one thread.
+
+    The filter's matrices are small: more threads make them slower, and the processes' threads would compete.  The
+    libraries read their number of threads once, when numpy loads them.  A forked process has numpy already, and may
+    inherit a lock that one of its parent's other threads holds; so the processes are spawned.  Those load numpy as soon
+    as they unpickle anything from here, before an initializer of the pool could run: the number has to be in the
+    environment that they are born with, and stands in this process's for as long as the pool does.  It changes nothing
+    here, where numpy is loaded.
+
+    Parameters
+    ----------
+    count : int
+        Of processes.
+    """
+    before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
+    pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"))
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def save_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write rows as Parquet, a row a flight, arrays as lists; written beside and then renamed.
+
+    Parameters
+    ----------
+    path : Path
+    rows : sequence of dict
+        Of `flight_row`.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    kinds = {int: pa.int64(), float: pa.float64(), bool: pa.bool_(), str: pa.string()}
+    columns = {name: pa.array([row[name] for row in rows], kinds[kind]) for name, kind in SCALARS.items()}
+    for name in ARRAYS:
+        values = [np.asarray(row[name], dtype=float) for row in rows]
+        ends = np.cumsum([0, *(v.size for v in values)], dtype=np.int32)
+        columns[name] = pa.ListArray.from_arrays(ends, pa.array(np.concatenate([np.empty(0), *values])))
+    beside = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        pq.write_table(pa.table(columns), beside, compression="zstd")
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def load_rows(path: Path) -> list[Row]:
+    """Rows as they were saved, bit for bit.
+
+    Raises
+    ------
+    RunFolderError
+        If the file is not there, is not Parquet or does not hold such rows.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        with path.open("rb") as file:
+            table = pq.read_table(file)
+    except OSError as failure:
+        raise RunFolderError(f"{path}: cannot be read: {failure.strerror or 'not a Parquet file'}") from None
+    except pa.ArrowException:
+        raise RunFolderError(f"{path}: cannot be read: not a Parquet file") from None
+    missing = [name for name in (*SCALARS, *ARRAYS) if name not in table.column_names]
+    if missing:
+        raise RunFolderError(f"{path}: is not a table of flights: column {missing[0]} is missing")
+    columns: dict[str, list[Any]] = {name: table[name].to_pylist() for name in SCALARS}
+    for name in ARRAYS:
+        columns[name] = [np.asarray(value.values.to_numpy(), dtype=float) for value in table[name]]
+    return [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
