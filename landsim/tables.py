@@ -198,7 +198,8 @@ def _errors(entries: Sequence[Mapping[str, Any]]) -> _Sheet:
 
     ranges = [row["range_m"] for row in entries[0]["listed"]]
     solved = any(e["precision"] is not None for e in entries)
-    headings = ["", "bound", *(f"{figure(r)} m" for r in ranges), "holds", *(["needs"] if solved else [])]
+    unit = "px" if entries[0]["reading"] == "endpoints" else "points"
+    headings = ["", "bound", *(f"{figure(r)} m" for r in ranges), "holds", *([f"needs {unit}"] if solved else [])]
     rows: list[list[str | Text]] = []
     for e in entries:
         cells: list[str | Text] = [f"{e['quantity']}, {_UNITS[e['unit']]}"]
@@ -206,7 +207,7 @@ def _errors(entries: Sequence[Mapping[str, Any]]) -> _Sheet:
         cells += ["–" if row["p95"] is None else figure(row["p95"]) for row in e["listed"]]
         short = {"holds": "yes", "does not hold": "no"}.get(said(e), said(e))
         cells.append(Text(short, style="" if e["holds"] is None else "green" if e["holds"] else "red"))
-        rows.append(cells + ([needed(e)] if solved else []))
+        rows.append(cells + ([needed(e).removesuffix(f" {unit}")] if solved else []))
     return _Sheet(headings, rows)
 
 

@@ -25,7 +25,7 @@ def test_python_examples_run() -> None:
 
 def test_commands_are_known() -> None:
     lines = [line for block in blocks("") for line in block.splitlines() if line.startswith("landsim ")]
-    assert len(lines) == 5
+    assert len(lines) == 12
     for line in lines:
         command, *arguments = shlex.split(line, comments=True)[1:]
         known = landsim.commands[command]
@@ -39,4 +39,4 @@ def test_links_lead_somewhere(target: str) -> None:
 
 def test_the_help_names_every_command() -> None:
     text = CliRunner().invoke(landsim, ["--help"]).output
-    assert all(f"  {command}" in text for command in ("list", "check", "run", "plot"))
+    assert all(f"  {command}" in text for command in ("list", "check", "run", "plot", "budget"))

@@ -421,7 +421,15 @@ class TestPage:
         text = captured.get()
         assert max(map(len, text.splitlines())) <= width
         assert "…" not in text
-        for word in ("early, vision, edge-points", "early, fused, edge-points", "from 250 m", "300–400 points", "yes"):
+        for word in (
+            "early, vision, edge-points",
+            "early, fused, edge-points",
+            "from 250 m",
+            "needs",
+            "points",
+            "300–400",
+            "yes",
+        ):
             assert word in text
         assert " ".join(verdict["paragraphs"]["meeting"].split()) in " ".join(text.split())
 

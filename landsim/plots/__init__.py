@@ -1,4 +1,4 @@
-"""Pictures of one flight: pure functions from its log to a matplotlib Figure.
+"""Pictures: of a flight, here, and of studies and budgets, in ``envelope``, ``tilt`` and ``budget``.
 
 Figures are built without pyplot, so that nothing is registered globally.  Colours are those of Okabe and Ito, and what
 a colour tells a line style or a marker tells too, so that the pictures survive grey print.  The functions take the log

@@ -54,7 +54,7 @@ from landsim.study.solvers import (
     timed,
 )
 from landsim.study.translations import COMPARED
-from landsim.study.words import as_text, listed
+from landsim.study.words import as_text, between, listed
 
 DRAWS = 500
 """At most: OpenCV takes some tens of microseconds a solution."""
@@ -226,7 +226,7 @@ def _against_lines(entries: list[dict[str, Any]], reading: Reading) -> str:
     if not best:
         return ""
     ratios = {key: [e["ratio"][key] for e in best if math.isfinite(e["ratio"][key])] for key in best[0]["ratio"]}
-    spans = [f"{as_text(key)} {min(values):.2f} to {max(values):.2f}" for key, values in ratios.items() if values]
+    spans = [f"{as_text(key)} {between(values)}" for key, values in ratios.items() if values]
     known = [ratio for values in ratios.values() for ratio in values]
     if not known:
         return ""

@@ -25,7 +25,7 @@ from landsim.study.draws import draw_lines, pose_errors
 from landsim.study.envelope import child, first_order, percentiles
 from landsim.study.frames import LINES_OF_STAGE, Frames, at_distances
 from landsim.study.model import OF_STAGE, QUANTITIES, READINGS, Reading, StageName
-from landsim.study.words import as_text, listed
+from landsim.study.words import as_text, between, listed
 from landsim.units import DEG
 
 PITCHES_DEG = tuple(float(p) for p in range(21))
@@ -292,11 +292,7 @@ def _ratios(stage: dict[str, Any], base: int, other: int) -> dict[str, list[floa
 
 def _change(stage: dict[str, Any], base: int, other: int) -> list[str]:
     """For each quantity the least and the greatest of its ratios."""
-    words = []
-    for name, ratios in _ratios(stage, base, other).items():
-        low, high = f"{min(ratios):.2f}", f"{max(ratios):.2f}"
-        words.append(f"{name} {low} to {high}" if low != high else f"{name} {low}")
-    return words
+    return [f"{name} {between(ratios)}" for name, ratios in _ratios(stage, base, other).items()]
 
 
 def _worst(stage: dict[str, Any], base: int, other: int) -> tuple[str, float]:

@@ -45,7 +45,7 @@ from landsim.study.draws import draw_lines
 from landsim.study.envelope import child
 from landsim.study.frames import Frames, at_distances
 from landsim.study.model import READINGS, Reading
-from landsim.study.words import as_text, listed
+from landsim.study.words import as_text, between, listed
 from landsim.units import DEG
 
 FORMS = ("coplanarity", "corner", "middle")
@@ -357,9 +357,6 @@ def _ratios(entries: list[dict[str, Any]], roll_error_deg: float) -> str:
     ):
         of_rotation = [entry["ratio"] for entry in entries if entry["rotation"] == rotation]
         if of_rotation:
-            spans = [
-                f"{as_text(axis)} {min(r[axis] for r in of_rotation):.2f} to {max(r[axis] for r in of_rotation):.2f}"
-                for axis in AXES
-            ]
+            spans = [f"{as_text(axis)} {between([r[axis] for r in of_rotation])}" for axis in AXES]
             words.append(f"{name}, {listed(spans)}")
     return "; ".join(words)
