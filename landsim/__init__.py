@@ -28,7 +28,7 @@ Modules
 A module imports from those below it only; a contract in the checks holds this.
 
 ===================================  ==================================================================================
-``cli``                              parses arguments and prints; ``tables`` is the table at the end of a flight
+``cli``, ``terminal``                parse arguments and print; ``tables`` are those at the end of a flight or a study
 ``report``, ``plots``                pictures; the only ones that import matplotlib
 ``runs``                             run folders, written whole or not at all
 ``budget``                           the line precision that bounds ask for, and the ranges from which they hold

@@ -5,38 +5,41 @@ stderr, nothing written; 1, a failure of landsim's own; 130, interrupted or term
 the commands that need them.
 """
 
-import io
 import itertools
 import os
-import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 from landsim import __version__
+from landsim.terminal import (
+    EXIT_BAD_INPUT,
+    EXIT_FAILURE,
+    EXIT_INTERRUPTED,
+    after,
+    fail,
+    make_printable,
+    print_tables,
+    printing,
+    progress_bar,
+    shown,
+    status,
+    terminable,
+)
 from landsim.threads import THREAD_VARIABLES
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from landsim.budget.result import Order
     from landsim.config import Scenario
     from landsim.log import Log
     from landsim.study.model import Envelope
 
-EXIT_FAILURE = 1
-EXIT_BAD_INPUT = 2
-EXIT_INTERRUPTED = 130
 SEED_DIGITS = 1000
+PATIENCE_S = 5.0
 DEBUG_VARIABLE = "LANDSIM_DEBUG"
-WIDTH = 100
-"""Of tables that are not printed to a terminal."""
 
 set_option = click.option(
     "--set",
@@ -70,7 +73,7 @@ def list_command() -> None:
         with (folder / resources.AIRCRAFT_FILE).open("rb") as file:
             aircraft[name] = str(tomllib.load(file).get("title", ""))
     width = max(map(len, (*scenarios, *aircraft)), default=0)
-    with _printing():
+    with printing():
         for heading, entries in (("scenarios", scenarios), ("aircraft", aircraft)):
             click.echo(heading)
             for name, text in entries.items():
@@ -93,7 +96,7 @@ def check(scenario: str, settings: tuple[str, ...]) -> None:
         from landsim.study.plan import plan_of
 
         plan_of(loaded)
-    with _printing():
+    with printing():
         click.echo(one_line(f"# {loaded.name}: {loaded.path}; aircraft: {loaded.aircraft_config.title}"))
         click.echo(resolved_toml(loaded), nl=False)
 
@@ -140,10 +143,12 @@ def run(scenario: str, seed: int | None, settings: tuple[str, ...], out: Path | 
         _run_study(loaded, seed, out, plots=not no_plots)
         return
     with new_run(loaded.name, out) as place:
-        with _status(f"flying {loaded.name}, seed {seed}") as say:
-            from landsim.simulate import fly
+        doing = f"flying {loaded.name}, seed {seed}"
+        with status(doing) as say:
+            with after(PATIENCE_S, lambda: say(f"{doing}; a first flight compiles, half a minute")):
+                from landsim.simulate import fly
 
-            flight = fly(loaded, seed=seed)
+                flight = fly(loaded, seed=seed)
             metrics = as_json(flight.metrics)
             write_run(place.temporary, loaded, flight)
             if not no_plots:
@@ -151,13 +156,9 @@ def run(scenario: str, seed: int | None, settings: tuple[str, ...], out: Path | 
                 _draw(place.temporary, loaded, flight.log, metrics)
         names = sorted(path.name for path in place.temporary.iterdir())
     taken = perf_counter() - begin
-    with _printing(f"{_shown(place.final)}: the run is there"):
-        click.echo(_shown(place.final))  # first, so that who reads no further knows
-        console = _console()
-        with console.capture() as text:  # rich would end the process where the reader has gone
-            for table in flight_tables(metrics, console.width):
-                console.print(table, crop=False)
-        sys.stdout.write(text.get())
+    with printing(f"{shown(place.final)}: the run is there"):
+        click.echo(shown(place.final))  # first, so that who reads no further knows
+        print_tables(lambda width: flight_tables(metrics, width))
         click.echo(f"flown in {metrics['wall_time_s']:.2f} s, all in {taken:.1f} s; written:")
         _echo_paths(place.final, names)
 
@@ -171,13 +172,13 @@ def plot(folder: Path) -> None:
 
     if (folder / VERDICT_FILE).is_file():
         study = read_study(folder)
-        with _status("drawing"):
+        with status("drawing"):
             paths = _draw_study(folder, study.scenario, study.envelopes, study.verdict)
     else:
         flown = read_run(folder)
-        with _status("drawing"):
+        with status("drawing"):
             paths = _draw(folder, flown.scenario, flown.log, flown.metrics)
-    with _printing(f"{_shown(folder)}: the pictures are there"):
+    with printing(f"{shown(folder)}: the pictures are there"):
         _echo_paths(folder, sorted(path.name for path in paths))
 
 
@@ -275,15 +276,15 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     # It has to be settled before numpy is imported.
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     debug = bool(os.environ.get(DEBUG_VARIABLE))
-    _make_printable()
+    make_printable()
     try:
-        with _terminable():
+        with terminable():
             code: Any = landsim.main(arguments, prog_name="landsim", standalone_mode=False)
     except click.UsageError as error:
         where = error.ctx.command_path if error.ctx else "landsim"
-        _fail(f"{error.format_message()}  See: {where} --help", EXIT_BAD_INPUT)
+        fail(f"{error.format_message()}  See: {where} --help", EXIT_BAD_INPUT)
     except click.ClickException as error:
-        _fail(error.format_message(), EXIT_BAD_INPUT)
+        fail(error.format_message(), EXIT_BAD_INPUT)
     except (click.Abort, KeyboardInterrupt):
         sys.exit(EXIT_INTERRUPTED)
     except Exception as error:
@@ -292,80 +293,12 @@ def main(arguments: list[str] | None = None) -> NoReturn:
         if debug:
             raise
         if isinstance(error, InputError):
-            _fail(str(error), EXIT_BAD_INPUT)
+            fail(str(error), EXIT_BAD_INPUT)
         text = f"{type(error).__name__}: {error}"
-        _fail(f"{text} (a fault of landsim; {DEBUG_VARIABLE}=1 shows where)", EXIT_FAILURE)
-    with _printing():  # what click itself printed
+        fail(f"{text} (a fault of landsim; {DEBUG_VARIABLE}=1 shows where)", EXIT_FAILURE)
+    with printing():  # what click itself printed
         pass
     sys.exit(code if isinstance(code, int) else 0)
-
-
-def _fail(message: str, code: int) -> NoReturn:
-    _tell(message)
-    sys.exit(code)
-
-
-def _tell(message: str) -> None:
-    """A line on stderr, if anything can be written there."""
-    from landsim.errors import one_line
-
-    try:
-        click.echo(f"landsim: {one_line(message)}", err=True)
-        sys.stderr.flush()
-    except OSError:
-        _discard(sys.stderr)
-
-
-def _make_printable() -> None:
-    """Standard streams that take every character, and that are there."""
-    for name in ("stdout", "stderr"):
-        stream = getattr(sys, name)
-        if stream is None:  # closed by who started this process
-            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
-        elif isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
-
-
-@contextmanager
-def _terminable() -> Iterator[None]:
-    """Within it SIGTERM interrupts like Ctrl-C, so that nothing half-written stays behind; a second one is ignored."""
-
-    def interrupt(_number: int, _frame: FrameType | None) -> NoReturn:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
-        raise KeyboardInterrupt
-
-    ours = threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
-    if ours:
-        signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        if ours:
-            signal.signal(signal.SIGTERM, signal.SIG_DFL)
-
-
-@contextmanager
-def _printing(done: str = "") -> Iterator[None]:
-    """Within it a reader of stdout who has gone is no failure, and nor is a full disk if something is ``done``."""
-    try:
-        yield
-        sys.stdout.flush()
-    except OSError as error:
-        _discard(sys.stdout)
-        if isinstance(error, BrokenPipeError):
-            return
-        reason = f"standard output cannot be written: {error.strerror}"
-        if not done:
-            _fail(reason, EXIT_FAILURE)
-        _tell(f"{done}; {reason}")
-
-
-def _discard(stream: Any) -> None:
-    """Let what is still in the stream's buffer go nowhere, where Python would complain about it at exit."""
-    with suppress(OSError, ValueError):  # a stand-in without a file
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, stream.fileno())
-        os.close(nowhere)
 
 
 def _load(scenario: str, settings: tuple[str, ...]) -> "tuple[Scenario, int | None]":
@@ -411,20 +344,16 @@ def _run_study(scenario: "Scenario", seed: int, out: Path | None, *, plots: bool
 
     plan_of(scenario)
     with new_run(scenario.name, out) as place:
-        with _progress(f"{scenario.name}, seed {seed}") as progress:
+        with progress_bar(f"{scenario.name}, seed {seed}") as progress:
             result = run_study(scenario, seed, progress)
         write_study(place.temporary, scenario, result.verdict, result.envelopes, result.listed, result.rows)
         if plots:
-            with _status("drawing"):
+            with status("drawing"):
                 _draw_study(place.temporary, scenario, result.envelopes, result.verdict)
         names = sorted(path.name for path in place.temporary.iterdir())
-    with _printing(f"{_shown(place.final)}: the study is there"):
-        click.echo(_shown(place.final))
-        console = _console()
-        with console.capture() as text:
-            for table in study_tables(result.verdict, console.width):
-                console.print(table, crop=False)
-        sys.stdout.write(text.get())
+    with printing(f"{shown(place.final)}: the study is there"):
+        click.echo(shown(place.final))
+        print_tables(lambda width: study_tables(result.verdict, width))
         click.echo(f"studied in {result.verdict['wall_time_s']:.1f} s; written:")
         _echo_paths(place.final, names)
 
@@ -455,7 +384,7 @@ def _budget(scenario: "Scenario", order: "Order", figure: Path | None, out: Path
         check_figure(figure)
     with ExitStack() as stack:
         place = None if out is None else stack.enter_context(new_run(scenario.name, out))
-        with _progress(f"budget of {scenario.name}") as progress:
+        with progress_bar(f"budget of {scenario.name}") as progress:
             done = itertools.count(1)
             made = make_budget(scenario, order, lambda what: progress and progress(next(done), steps(order), what))
         result = as_json(as_dict(made))
@@ -466,17 +395,13 @@ def _budget(scenario: "Scenario", order: "Order", figure: Path | None, out: Path
         if paths:
             _draw_budget(result, paths)
     written = [*([] if figure is None else [figure]), *([] if place is None else [place.final])]
-    with _printing("; ".join(f"{_shown(path)}: the budget is there" for path in written)):
+    with printing("; ".join(f"{shown(path)}: the budget is there" for path in written)):
         if as_text:
             click.echo(to_text(result), nl=False)
             return
-        console = _console()
-        with console.capture() as text:
-            for table in budget_tables(result, console.width):
-                console.print(table, crop=False)
-        sys.stdout.write(text.get())
+        print_tables(lambda width: budget_tables(result, width))
         for path in written:
-            click.echo(_shown(path))
+            click.echo(shown(path))
         if place is not None:
             _echo_paths(place.final, [JSON_FILE, *FIGURES])
 
@@ -495,65 +420,15 @@ def _draw_budget(result: dict[str, Any], paths: list[Path]) -> None:
     from landsim.plots.budget import save_budget
 
     try:
-        with _status("drawing"):
+        with status("drawing"):
             save_budget(result, paths)
     except OSError as error:
         raise RunFolderError(f"{error.filename or paths[0]}: cannot be written: {error.strerror}") from None
 
 
-def _console(*, stderr: bool = False) -> "Console":
-    from rich.console import Console
-
-    from landsim.tables import NARROWEST
-
-    console = Console(stderr=stderr, highlight=False)
-    console.width = max(console.width, NARROWEST) if console.is_terminal else WIDTH
-    return console
-
-
 def _echo_paths(folder: Path, names: list[str]) -> None:
     for name in names:
-        click.echo(f"  {_shown(folder / name)}")
-
-
-def _shown(path: Path) -> str:
-    """The path as it is printed: from the working directory if it is below that, and on one line."""
-    from landsim.errors import one_line
-
-    with suppress(OSError, ValueError):  # no working directory any more, or not below it
-        path = path.relative_to(Path.cwd())
-    return one_line(str(path))
-
-
-@contextmanager
-def _status(text: str) -> "Iterator[Callable[[str], None]]":
-    """A line that lives while something is done, on a terminal only; what it yields changes its text."""
-    if not sys.stderr.isatty():
-        yield lambda _: None
-        return
-    from rich.text import Text
-
-    with _console(stderr=True).status(Text(text)) as status:
-        yield lambda changed: status.update(Text(changed))
-
-
-@contextmanager
-def _progress(text: str) -> "Iterator[Callable[[float, float, str], None] | None]":
-    """A bar that grows with what is done, on a terminal only."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.markup import escape
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
-    with Progress(
-        *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=_console(stderr=True), transient=True
-    ) as bar:
-        task = bar.add_task(escape(text), total=None)
-        yield lambda done, total, what: bar.update(
-            task, completed=done, total=total, description=escape(f"{text}: {what}")
-        )
+        click.echo(f"  {shown(folder / name)}")
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.stats import norm
 
-from landsim import cli
+from landsim import cli, terminal
 from landsim.budget import Budget, Order, Requirement, make_budget, parse_requirement, parse_sweep, setting_of
 from landsim.budget.setting import frames_at, hand_over, stage_at
 from landsim.budget.solve import bound_kept, confirm, need, seed_of, shifts, sigma_within
@@ -336,7 +336,7 @@ class TestCommand:
         needed = budget_of("altitude=0.5@600").rows[0].needs["endpoints"].noise_px
         assert f"endpoints: altitude 0.5 m at 600 m decides, with {needed:.3g} px" in " ".join(out.split())
         assert list(tmp_path.iterdir()) == []
-        assert max(map(len, out.splitlines())) <= cli.WIDTH
+        assert max(map(len, out.splitlines())) <= terminal.WIDTH
 
     def test_settings_reach_it(self, landsim: Run) -> None:
         outs = [landsim(*REQUIRE, *setting)[1] for setting in ((), ("--set", "runway.width_m=45"))]

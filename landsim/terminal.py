@@ -1,0 +1,165 @@
+"""What the command line needs of a terminal: streams that are there, one-line errors, a status line, a progress bar."""
+
+import io
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import click
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+
+EXIT_FAILURE = 1
+EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130
+WIDTH = 100
+"""Of tables that are not printed to a terminal."""
+
+
+def fail(message: str, code: int) -> NoReturn:
+    """End the process with a line on stderr."""
+    tell(message)
+    sys.exit(code)
+
+
+def tell(message: str) -> None:
+    """A line on stderr, if anything can be written there."""
+    from landsim.errors import one_line
+
+    try:
+        click.echo(f"landsim: {one_line(message)}", err=True)
+        sys.stderr.flush()
+    except OSError:
+        discard(sys.stderr)
+
+
+def make_printable() -> None:
+    """Standard streams that take every character, and that are there."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:  # closed by who started this process
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+@contextmanager
+def terminable() -> Iterator[None]:
+    """Within it SIGTERM interrupts like Ctrl-C, so that nothing half-written stays behind; a second one is ignored."""
+
+    def interrupt(_number: int, _frame: FrameType | None) -> NoReturn:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    ours = threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    if ours:
+        signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        if ours:
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+@contextmanager
+def printing(done: str = "") -> Iterator[None]:
+    """Within it a reader of stdout who has gone is no failure, and nor is a full disk if something is ``done``."""
+    try:
+        yield
+        sys.stdout.flush()
+    except OSError as error:
+        discard(sys.stdout)
+        if isinstance(error, BrokenPipeError):
+            return
+        reason = f"standard output cannot be written: {error.strerror}"
+        if not done:
+            fail(reason, EXIT_FAILURE)
+        tell(f"{done}; {reason}")
+
+
+def discard(stream: Any) -> None:
+    """Let what is still in the stream's buffer go nowhere, where Python would complain about it at exit."""
+    with suppress(OSError, ValueError):  # a stand-in without a file
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
+
+
+def console_of(*, stderr: bool = False) -> "Console":
+    """Where tables go: as wide as the terminal, or `WIDTH` where there is none."""
+    from rich.console import Console
+
+    from landsim.tables import NARROWEST
+
+    console = Console(stderr=stderr, highlight=False)
+    console.width = max(console.width, NARROWEST) if console.is_terminal else WIDTH
+    return console
+
+
+def print_tables(made: "Callable[[int], Iterable[RenderableType]]") -> None:
+    """Print what is made for the width of the terminal."""
+    console = console_of()
+    with console.capture() as text:  # rich would end the process where the reader has gone
+        for table in made(console.width):
+            console.print(table, crop=False)
+    sys.stdout.write(text.get())
+
+
+def shown(path: Path) -> str:
+    """The path as it is printed: from the working directory if it is below that, and on one line."""
+    from landsim.errors import one_line
+
+    with suppress(OSError, ValueError):  # no working directory any more, or not below it
+        path = path.relative_to(Path.cwd())
+    return one_line(str(path))
+
+
+@contextmanager
+def status(text: str) -> "Iterator[Callable[[str], None]]":
+    """A line that lives while something is done, on a terminal only; what it yields changes its text."""
+    if not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    from rich.text import Text
+
+    with console_of(stderr=True).status(Text(text)) as status:
+        yield lambda changed: status.update(Text(changed))
+
+
+@contextmanager
+def after(seconds: float, what: Callable[[], None]) -> Iterator[None]:
+    """Within it something is done once, if it lasts longer than so many seconds."""
+    timer = threading.Timer(seconds, what)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()
+
+
+@contextmanager
+def progress_bar(text: str) -> "Iterator[Callable[[float, float, str], None] | None]":
+    """A bar that grows with what is done, on a terminal only."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.markup import escape
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
+    with Progress(
+        *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console_of(stderr=True), transient=True
+    ) as bar:
+        task = bar.add_task(escape(text), total=None)
+        yield lambda done, total, what: bar.update(
+            task, completed=done, total=total, description=escape(f"{text}: {what}")
+        )
