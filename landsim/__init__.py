@@ -44,7 +44,7 @@ A module imports from those below it only; a contract in the checks holds this.
 ``scene``                            from a scenario's settings to its runway and its aircraft's incidence
 ``config``, ``schema``               TOML to frozen, validated models
 ``resources``                        finds the shipped aircraft and scenarios
-``log``                              the table of columns; save and load
+``log``, ``parquet``                 the table of columns; tables as files
 ``state``, ``truth``                 what is known on board; what is true
 ``runway``, ``attitude``             the runway on the Earth; attitude in its frame
 ``earth``, ``errors``, ``plain``     WGS 84; one-line errors; values as JSON has them

@@ -22,6 +22,7 @@ from landsim.config import Scenario
 from landsim.errors import InputError, RunFolderError
 from landsim.log import QUANTITIES, Log
 from landsim.metrics import CRASHES, EARLY_NUMBERS, LATE_NUMBERS, error
+from landsim.parquet import read_table, write_table
 from landsim.simulate import Flight, fly
 from landsim.state import Stage
 from landsim.threads import THREAD_VARIABLES
@@ -309,7 +310,6 @@ def save_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         Of `flight_row`.
     """
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     kinds = {int: pa.int64(), float: pa.float64(), bool: pa.bool_(), str: pa.string()}
     columns = {name: pa.array([row[name] for row in rows], kinds[kind]) for name, kind in SCALARS.items()}
@@ -317,12 +317,7 @@ def save_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         values = [np.asarray(row[name], dtype=float) for row in rows]
         ends = np.cumsum([0, *(v.size for v in values)], dtype=np.int32)
         columns[name] = pa.ListArray.from_arrays(ends, pa.array(np.concatenate([np.empty(0), *values])))
-    beside = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        pq.write_table(pa.table(columns), beside, compression="zstd")
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
+    write_table(path, pa.table(columns))
 
 
 def load_rows(path: Path) -> list[Row]:
@@ -333,16 +328,7 @@ def load_rows(path: Path) -> list[Row]:
     RunFolderError
         If the file is not there, is not Parquet or does not hold such rows.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        with path.open("rb") as file:
-            table = pq.read_table(file)
-    except OSError as failure:
-        raise RunFolderError(f"{path}: cannot be read: {failure.strerror or 'not a Parquet file'}") from None
-    except pa.ArrowException:
-        raise RunFolderError(f"{path}: cannot be read: not a Parquet file") from None
+    table = read_table(path)
     missing = [name for name in (*SCALARS, *ARRAYS) if name not in table.column_names]
     if missing:
         raise RunFolderError(f"{path}: is not a table of flights: column {missing[0]} is missing")

@@ -3,7 +3,6 @@
 A row is one step of the plant.  What a camera frame gives is NaN in the rows between frames.
 """
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from landsim.errors import RunFolderError, did_you_mean
+from landsim.errors import did_you_mean
+from landsim.parquet import read_table, write_table
 
 Log: TypeAlias = dict[str, NDArray[np.float64]]
 """Columns by name, all of one length."""
@@ -126,7 +126,6 @@ def save_log(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
         If a column is missing or unknown, or its shape differs from the others'.
     """
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     names = [column.name for column in COLUMNS]
     for name in columns:
@@ -144,20 +143,9 @@ def save_log(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
         pa.field(c.name, pa.float64(), False, {"unit": c.unit, "frame": c.frame, "description": c.what})
         for c in COLUMNS
     ]
-    beside = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        # Splitting floats into their bytes, not a dictionary of values, is what makes smooth signals small.
-        pq.write_table(
-            pa.Table.from_arrays(arrays, schema=pa.schema(fields)),
-            beside,
-            compression="zstd",
-            compression_level=6,
-            use_dictionary=False,
-            use_byte_stream_split=True,
-        )
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
+    # Splitting floats into their bytes, not a dictionary of values, is what makes smooth signals small.
+    table = pa.Table.from_arrays(arrays, schema=pa.schema(fields))
+    write_table(path, table, compression_level=6, use_dictionary=False, use_byte_stream_split=True)
 
 
 def load_log(path: Path) -> Log:
@@ -168,15 +156,5 @@ def load_log(path: Path) -> Log:
     RunFolderError
         If the file is not there or is not Parquet.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        # Not by name, which would look for partitions in the names of the folders above.
-        with path.open("rb") as file:
-            table = pq.read_table(file)
-    except OSError as error:
-        raise RunFolderError(f"{path}: cannot be read: {error.strerror or 'not a Parquet file'}") from None
-    except pa.ArrowException:
-        raise RunFolderError(f"{path}: cannot be read: not a Parquet file") from None
+    table = read_table(path)
     return {name: table[name].to_numpy().astype(np.float64) for name in table.column_names}

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from approach import PROTOTYPE
 from scipy.optimize import brentq
 from scipy.stats import norm
 
@@ -33,18 +34,6 @@ LANDING = load_scenario("landing")
 SETTING = setting_of(STUDY)
 QUANTITIES = OF_STAGE["early"]
 
-# independent prototype, 50,000 draws, σ = √2 px: 68.27th percentiles of roll, pitch, yaw (°), cross, altitude and
-# along (m)
-PROTOTYPE: dict[tuple[int, Reading], tuple[float, ...]] = {
-    (1000, "endpoints"): (3.03, 0.296, 0.176, 3.82, 6.89, 56.0),
-    (1000, "edge-points"): (1.18, 0.0928, 0.0664, 1.44, 2.32, 15.3),
-    (400, "endpoints"): (1.21, 0.119, 0.0892, 0.982, 1.16, 10.5),
-    (400, "edge-points"): (0.304, 0.0274, 0.0215, 0.251, 0.303, 2.15),
-    (200, "endpoints"): (0.606, 0.0783, 0.0732, 0.455, 0.386, 3.26),
-    (200, "edge-points"): (0.107, 0.0140, 0.0130, 0.0886, 0.0805, 0.500),
-    (60, "edge-points"): (0.0181, 0.00597, 0.00852, 0.0187, 0.0108, 0.0369),
-}
-
 
 def budget_of(*texts: str, scenario: Any = STUDY, sweeps: tuple[str, ...] = (), **order: Any) -> Budget:
     requirements = tuple(map(parse_requirement, texts))
@@ -52,7 +41,7 @@ def budget_of(*texts: str, scenario: Any = STUDY, sweeps: tuple[str, ...] = (), 
 
 
 @pytest.mark.parametrize(("distance", "reading"), PROTOTYPE)
-def test_the_prototypes_errors_take_its_noise(distance: int, reading: Reading) -> None:
+def test_the_prototypes_errors_take_its_noise(distance: float, reading: Reading) -> None:
     """Bounds that are the prototype's percentiles, at that confidence, must need the noise that it drew."""
     for name, percentile in zip(QUANTITIES, PROTOTYPE[distance, reading], strict=True):
         budget = budget_of(f"{name}={percentile}@{distance}", confidence_percent=68.27)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from approach import paper
+from approach import PROTOTYPE, paper
 
 from landsim.batch import ARRAYS, SCALARS, Row
 from landsim.log import QUANTITIES as COLUMNS
@@ -135,19 +135,11 @@ def test_rows_at_different_distances_are_not_laid_over_each_other() -> None:
         envelopes(paper(), [flown([400.0]), flown([300.0])], "edge-points")
 
 
-# By an independent prototype, 68.27th percentile of roll, pitch, yaw (deg), cross, altitude, along (m).
-PROTOTYPE = {
-    ("endpoints", 400.0): (1.21, 0.119, 0.0892, 0.982, 1.16, 10.5),
-    ("edge-points", 400.0): (0.304, 0.0274, 0.0215, 0.251, 0.303, 2.15),
-    ("edge-points", 200.0): (0.107, 0.0140, 0.0130, 0.0886, 0.0805, 0.500),
-}
-
-
-@pytest.mark.parametrize(("reading", "distance"), PROTOTYPE)
-def test_first_order_at_the_pose_flown(reading: Any, distance: float) -> None:
+@pytest.mark.parametrize(("distance", "reading"), PROTOTYPE)
+def test_first_order_at_the_pose_flown(distance: float, reading: Any) -> None:
     rows = [flown([distance], line_noise=reading)] * 2
     vision = named(envelopes(paper(), rows, reading), "early", "vision")
-    expected = np.array(PROTOTYPE[reading, distance]) * ([DEGREE] * 3 + [1.0] * 3)
+    expected = np.array(PROTOTYPE[distance, reading]) * ([DEGREE] * 3 + [1.0] * 3)
     np.testing.assert_allclose(vision.sigma[0], expected, rtol=0.03)
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from approach import RANGES, F, camera_rotation, paper
+from approach import PROTOTYPE, RANGES, F, camera_rotation, paper
 from numpy.random import SeedSequence, default_rng
 
 from estimator import fit_line
@@ -22,18 +22,6 @@ from landsim.units import DEG
 ROOT2 = math.sqrt(2.0)
 DRAWS = 20_000
 SHOWN = np.array((DEG, DEG, DEG, 1.0, 1.0, 1.0))
-
-# Source: an independent prototype, 50,000 draws; 68.27th percentile of the absolute error, runway 2000 m by 30 m,
-# camera on the centreline.  roll, pitch, yaw (deg), cross, altitude, along (m).
-PROTOTYPE: dict[tuple[float, Reading], tuple[float, ...]] = {
-    (1000.0, "endpoints"): (3.03, 0.296, 0.176, 3.82, 6.89, 56.0),
-    (1000.0, "edge-points"): (1.18, 0.0928, 0.0664, 1.44, 2.32, 15.3),
-    (400.0, "endpoints"): (1.21, 0.119, 0.0892, 0.982, 1.16, 10.5),
-    (400.0, "edge-points"): (0.304, 0.0274, 0.0215, 0.251, 0.303, 2.15),
-    (200.0, "endpoints"): (0.606, 0.0783, 0.0732, 0.455, 0.386, 3.26),
-    (200.0, "edge-points"): (0.107, 0.0140, 0.0130, 0.0886, 0.0805, 0.500),
-    (60.0, "edge-points"): (0.0181, 0.00597, 0.00852, 0.0187, 0.0108, 0.0369),
-}
 
 
 @pytest.fixture(scope="module")

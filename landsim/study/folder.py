@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from landsim.config import Scenario, load_scenario, resolved_toml
 from landsim.errors import RunFolderError, is_text, one_line, what_is_wrong
+from landsim.parquet import read_table, write_table
 from landsim.study.model import QUANTITIES, Envelope
 from landsim.units import DEG
 
@@ -151,7 +152,6 @@ def save_envelopes(path: Path, envelopes: Sequence[Envelope], listed: Sequence[E
         Told apart by the column ``listed``.
     """
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     columns: dict[str, list[Any]] = {name: [] for name in COLUMNS}
     for group, in_list in ((envelopes, False), (listed, True)):
@@ -160,7 +160,7 @@ def save_envelopes(path: Path, envelopes: Sequence[Envelope], listed: Sequence[E
                 _append(columns, envelope, k, name, listed=in_list)
     kinds = {"listed": pa.bool_(), "count": pa.int64(), **dict.fromkeys(WORDS, pa.string())}
     table = pa.table({name: pa.array(values, kinds.get(name, pa.float64())) for name, values in columns.items()})
-    pq.write_table(table, path, compression="zstd")
+    write_table(path, table)
 
 
 def _append(columns: dict[str, list[Any]], envelope: Envelope, k: int, name: str, *, listed: bool) -> None:
@@ -190,16 +190,7 @@ def load_envelopes(path: Path, *, listed: bool) -> tuple[Envelope, ...]:
     RunFolderError
         If the file is not there or does not hold envelopes.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        with path.open("rb") as file:
-            table = pq.read_table(file)
-    except OSError as error:
-        raise RunFolderError(f"{path}: cannot be read: {error.strerror or 'not a Parquet file'}") from None
-    except pa.ArrowException:
-        raise RunFolderError(f"{path}: cannot be read: not a Parquet file") from None
+    table = read_table(path)
     missing = [name for name in COLUMNS if name not in table.column_names]
     if missing:
         raise RunFolderError(f"{path}: is not a table of envelopes: column {missing[0]} is missing")
