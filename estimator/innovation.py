@@ -85,7 +85,7 @@ class Eye(NamedTuple):
 def camera_from_state(attitude: Mat3, lever: Vec3) -> Array:
     """Derivative (6, 15) of the camera's position and rotation by the filter's errors."""
     x, y, z = rotate(attitude, lever)
-    result = np.zeros((6, 15))
+    result = np.zeros((6, STATES))
     for i in range(3):
         result[i, i] = result[3 + i, 6 + i] = 1.0
     # δC = δp + ψ × (R lever)
@@ -102,7 +102,7 @@ def _late_state(camera: Array, secant: float, tangent: float, lateral: float, do
     The direction of the edges gives yaw and pitch whatever the roll; y and z are off by what the filter's rotation
     about the runway's x axis is off, which the pose was held to.
     """
-    result = np.zeros((4, 15))
+    result = np.zeros((4, STATES))
     result[0, 8] = 1.0
     result[1, 7] = secant
     result[2:] = camera[1:3]
@@ -149,7 +149,7 @@ def frame_innovation(eye: Array, lines: Array, nominal: Array, tilt: float) -> t
     y, H, R : (n,), (n, 15) and (n, n) array
         n is 6 early and 4 late; 0 where there is no measurement.
     """
-    nothing = np.empty(0), np.empty((0, 15)), np.empty((0, 0))
+    nothing = np.empty(0), np.empty((0, STATES)), np.empty((0, 0))
     if np.isnan(lines[LEFT, 0]) or np.isnan(lines[RIGHT, 0]):
         return nothing
     camera = Intrinsics(eye[0], eye[1], eye[2], eye[3])

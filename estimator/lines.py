@@ -56,7 +56,8 @@ def fit_variances(spread: Number, points: Number, sigma: float) -> tuple[Number,
     down to a tenth of the measured value where the points are all noise.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        return unguarded_variances(spread, points, sigma)
+        offset, angle = unguarded_variances(spread, points, sigma)
+    return offset, np.where(np.asarray(spread) > 0.0, angle, np.inf)
 
 
 def unguarded_variances(spread: Number, points: Number, sigma: float) -> tuple[Number, Number]:

@@ -1,7 +1,7 @@
 """Rotations on plain numbers: 3-vectors as 3-tuples, 3 × 3 matrices as 9-tuples, row by row.
 
 On tuples of floats the same text serves as it stands and compiled (`estimator.compiled`), where a small array would
-cost more to allocate than to compute with.  Every function is pure and calls no other that is compiled.
+cost more to allocate than to compute with.  Every function is pure; those that are compiled call no other.
 """
 
 import math

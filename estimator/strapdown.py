@@ -196,7 +196,7 @@ def advance(nominal: Array, bias: Array, sample: Array, site: Array, dt: float) 
     angle = (sample[0] - bias[0] * dt, sample[1] - bias[1] * dt, sample[2] - bias[2] * dt)
     velocity = (sample[3] - bias[3] * dt, sample[4] - bias[4] * dt, sample[5] - bias[5] * dt)
     moved, force = propagate(unpacked(nominal), place, angle, velocity, dt)
-    result = np.empty(18)
+    result = np.empty(NOMINAL)
     for i in range(3):
         result[i] = moved.position[i]
         result[3 + i] = moved.velocity[i]
@@ -240,7 +240,7 @@ def transition(nominal: Array, dt: float) -> Array:
     (15, 15) array
     """
     x, y, z = nominal[15], nominal[16], nominal[17]
-    result = np.eye(15)
+    result = np.eye(STATES)
     half = 0.5 * dt
     for i in range(3):
         result[i, 3 + i] = dt
@@ -281,7 +281,7 @@ def process_noise(noise: ImuNoise, dt: float) -> Array:
 def corrected(nominal: Array, error: Array) -> Array:
     """The nominal state (18,) with the first nine of the errors taken into it, and no specific force any more."""
     attitude = matmul(exp((error[6], error[7], error[8])), unpacked(nominal).attitude)
-    result = np.zeros(18)
+    result = np.zeros(NOMINAL)
     for i in range(6):
         result[i] = nominal[i] + error[i]
     for i in range(9):

@@ -49,6 +49,7 @@ A module imports from those below it only; a contract in the checks holds this.
 ``runway``, ``attitude``             the runway on the Earth; attitude in its frame
 ``earth``, ``errors``, ``plain``     WGS 84; one-line errors; values as JSON has them
 ``units``, ``threads``               every conversion factor; how matrix libraries take their number of threads
+``versions``                         those that decide the bits of a result
 ===================================  ==================================================================================
 """
 

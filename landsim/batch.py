@@ -23,7 +23,7 @@ from landsim.errors import InputError, RunFolderError
 from landsim.log import QUANTITIES, Log
 from landsim.metrics import CRASHES, EARLY_NUMBERS, LATE_NUMBERS, error
 from landsim.parquet import read_table, write_table
-from landsim.simulate import Flight, fly
+from landsim.simulate import Flight, fly, must_fly
 from landsim.state import Stage
 from landsim.threads import THREAD_VARIABLES
 
@@ -120,10 +120,7 @@ def flight_row(scenario: Scenario, seed: int, distances: ArrayLike | None = None
     ValueError
         If the scenario is not a flight, or the seed is not a whole number of zero or more.
     """
-    if scenario.kind != "flight":
-        raise ValueError(f"{scenario.name}: a scenario of the kind {scenario.kind!r} is not flown")
-    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-        raise ValueError(f"seed must be a whole number that is not negative, not {seed!r}")
+    must_fly(scenario, seed)
     at = np.asarray(distances_of(scenario) if distances is None else distances, dtype=float)
     try:
         return row_of(scenario, fly(scenario, seed), at)

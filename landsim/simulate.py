@@ -4,13 +4,10 @@ One step of the plant: the sensors measure its state, navigation takes the measu
 from the navigation state, and the plant's own inner loops fly it until the next step.
 """
 
-import importlib.metadata
 import math
-import platform
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, NamedTuple
 
 from numpy.random import Generator, SeedSequence, default_rng
@@ -29,6 +26,7 @@ from landsim.scene import incidence_of, runway_of
 from landsim.sensors import Imu, LineCamera, Pitot, TiltMount, camera_of, imu_noise, site_of
 from landsim.truth import InitialState, Truth
 from landsim.units import DEG
+from landsim.versions import versions
 
 STANDSTILL = 0.05
 """Ground speed below which the aircraft stands, m/s."""
@@ -90,10 +88,7 @@ def fly(scenario: Scenario, seed: int = 0) -> Flight:
     ValueError
         If the scenario is not a flight, or the seed is not a whole number of zero or more.
     """
-    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-        raise ValueError(f"seed must be a whole number that is not negative, not {seed!r}")
-    if scenario.kind != "flight":
-        raise ValueError(f"{scenario.name}: a scenario of the kind {scenario.kind!r} is not flown")
+    must_fly(scenario, seed)
     began = time.perf_counter()
     aircraft = scenario.aircraft_config
     recorder = Recorder(
@@ -123,9 +118,17 @@ def fly(scenario: Scenario, seed: int = 0) -> Flight:
             "speed_mps": start.speed,
         },
         wall_time_s=time.perf_counter() - began,
-        versions=_versions(),
+        versions=versions(),
     )
     return Flight(metrics, log)
+
+
+def must_fly(scenario: Scenario, seed: int) -> None:
+    """Raise ValueError if the scenario is not a flight, or the seed is not a whole number of zero or more."""
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise ValueError(f"seed must be a whole number that is not negative, not {seed!r}")
+    if scenario.kind != "flight":
+        raise ValueError(f"{scenario.name}: a scenario of the kind {scenario.kind!r} is not flown")
 
 
 class End(NamedTuple):
@@ -247,15 +250,3 @@ def _crash(recorder: Recorder, truth: Truth, *known: Any) -> End:
         return End("error", "JSBSim's state is not finite")
     recorder.step(truth, *known)
     return End("structure_contact" if truth.structure_contact else "below_ground")
-
-
-@cache
-def _versions() -> dict[str, str]:
-    names = ("landsim", "jsbsim", "numpy", "scipy", "filterpy")
-    found = {"python": platform.python_version()}
-    for name in names:
-        try:
-            found[name] = importlib.metadata.version(name)
-        except importlib.metadata.PackageNotFoundError:
-            found[name] = "not installed"
-    return found

@@ -4,8 +4,6 @@ Everything random comes from the study's seed by the task's own place in it, so 
 processes there are, nor on which was faster.  Only the measured times differ from run to run.
 """
 
-import importlib.metadata
-import platform
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -38,6 +36,7 @@ from landsim.study.timing import timing
 from landsim.study.translations import translations
 from landsim.study.verdict import verdict_of
 from landsim.units import DEG
+from landsim.versions import versions
 
 NUMBERS_PER_SECOND = 2.5e7
 """Roughly, that are drawn and fitted: for the progress alone."""
@@ -180,7 +179,7 @@ def run_study(
         "timing": timing(scenario),  # when nothing else runs
         "tilt": found["tilt"][0],
     }
-    verdict["versions"] = _versions()
+    verdict["versions"] = versions("opencv-python-headless", "poselib")
     verdict["wall_time_s"] = time.perf_counter() - began
     return StudyResult(scenario, seed, tuple(by_range), tuple(listed), tuple(rows), as_json(verdict))
 
@@ -303,14 +302,4 @@ def _filter_errors(plan: Plan, rows: Sequence[Row]) -> dict[tuple[Reading, float
             errors = attitude_errors(flown, distance)
             if len(errors):
                 found[reading, distance] = errors
-    return found
-
-
-def _versions() -> dict[str, str]:
-    found = {"python": platform.python_version()}
-    for name in ("landsim", "jsbsim", "numpy", "scipy", "filterpy", "opencv-python-headless", "poselib"):
-        try:
-            found[name] = importlib.metadata.version(name)
-        except importlib.metadata.PackageNotFoundError:
-            found[name] = "not installed"
     return found
