@@ -243,7 +243,9 @@ class StudyConfig(Section):
     """Distances to the threshold, negative past it, at which figures are listed."""
     listed_draws: Annotated[int, Field(ge=100, le=10_000_000)] = 20_000
     """At each of them."""
-    roll_errors_deg: Annotated[tuple[float, ...], BeforeValidator(_tuple_from_list), Field(min_length=1)] = (0.0,)
+    roll_errors_deg: Annotated[
+        tuple[Annotated[float, Field(ge=-45.0, le=45.0)], ...], BeforeValidator(_tuple_from_list), Field(min_length=1)
+    ] = (0.0,)
     """By which the roll angle given to the late stage is off."""
     flights: Annotated[int, Field(ge=0, le=100_000)] = 100
     """Flown with seeds from the run's own on, for each reading."""
@@ -261,6 +263,10 @@ class StudyConfig(Section):
     def _agree(self) -> Self:
         if any(a <= b for a, b in pairwise(self.ranges_m)):
             raise _refused(f"must fall from each to the next, not {list(self.ranges_m)}", "ranges_m")
+        for key in ("readings", "roll_errors_deg"):
+            values: tuple[object, ...] = getattr(self, key)
+            if len(set(values)) < len(values):
+                raise _refused(f"must not repeat any, not {list(values)}", key)
         if self.method == "flights" and self.flights < 2:
             raise _refused(f'must be at least 2 with method = "flights", not {self.flights}', "flights")
         return self

@@ -193,7 +193,7 @@ def _errors(entries: Sequence[Mapping[str, Any]]) -> _Sheet:
     """The 95th percentiles at the listed ranges, and what becomes of the bound."""
     from rich.text import Text
 
-    from landsim.study.markdown import needed, said
+    from landsim.study.markdown import cell, needed, said
     from landsim.study.paragraphs import figure
 
     ranges = [row["range_m"] for row in entries[0]["listed"]]
@@ -204,7 +204,7 @@ def _errors(entries: Sequence[Mapping[str, Any]]) -> _Sheet:
     for e in entries:
         cells: list[str | Text] = [f"{e['quantity']}, {_UNITS[e['unit']]}"]
         cells.append("–" if e["bound"] is None else figure(e["bound"]))
-        cells += ["–" if row["p95"] is None else figure(row["p95"]) for row in e["listed"]]
+        cells += [cell(row, "p95") for row in e["listed"]]
         short = {"holds": "yes", "does not hold": "no"}.get(said(e), said(e))
         cells.append(Text(short, style="" if e["holds"] is None else "green" if e["holds"] else "red"))
         rows.append(cells + ([needed(e).removesuffix(f" {unit}")] if solved else []))
@@ -250,7 +250,7 @@ def _needs(budget: Mapping[str, Any]) -> _Sheet:
     headings = ["requirement", "stage", "keeps now", "needs σ", *(["drawn"] if drawn else [])]
     headings += ["or points", "now"]
     rows: list[list[str | Text]] = []
-    finer = False
+    finer = doubtful = False
     for requirement in budget["requirements"]:
         if requirement["stage"] is None:
             continue
@@ -258,10 +258,11 @@ def _needs(budget: Mapping[str, Any]) -> _Sheet:
         name, stage = requirement_text(requirement), requirement["stage"]
         for reading in READINGS:
             of = requirement[reading]
-            needed, points = of["needed_noise_px"], of.get("needed_points")
-            enough = needed is not None and there <= needed
-            cells: list[str | Text] = [f"{name}, {reading}", stage, amount(of[f"present_{unit}"], unit, ".3g")]
-            cells.append(Text("none" if needed is None else f"{needed:.3g} px", style="green" if enough else "red"))
+            points = of.get("needed_points")
+            present = of[f"present_{unit}"]
+            cells: list[str | Text] = [f"{name}, {reading}", stage]
+            cells += ["–" if present is None else amount(present, unit, ".3g"), _needed(of, there)]
+            doubtful |= of["first_order_holds"] is False
             if drawn:
                 cells.append(f"{of['inside_percent']:.1f} %" if "inside_percent" in of else "–")
             if points:
@@ -278,9 +279,28 @@ def _needs(budget: Mapping[str, Any]) -> _Sheet:
         f"now: σ = {noise:.3g} px; points: a line, of that σ, on left edge/threshold/right edge, late on the two edges"
     )
     note += "; * closer than a pixel to each other" if finer else ""
+    note += f"; {_doubt(budget)}" if doubtful else ""
     if drawn:
         note += f"; drawn: of {budget['confirmed']['draws']} draws with the σ needed, so many were within the bound"
     return _Sheet(headings, rows, note)
+
+
+def _needed(of: Mapping[str, Any], there: float) -> "Text":
+    """The σ that one requirement needs of one reading."""
+    from rich.text import Text
+
+    needed = of["needed_noise_px"]
+    if needed is None:
+        return Text("none", style="red")
+    if not of["first_order_holds"]:
+        return Text(f"{needed:.3g} px ?", style="yellow")
+    return Text(f"{needed:.3g} px", style="green" if there <= needed else "red")
+
+
+def _doubt(budget: Mapping[str, Any]) -> str:
+    """What the mark of a figure says that drawing does not bear out."""
+    percent = f"{budget['checked']['off_by_percent']:g} %"
+    return f"? not to be trusted: as drawing shows, first order is off by more than {percent} there"
 
 
 def _held(budget: Mapping[str, Any]) -> _Sheet:
@@ -289,12 +309,15 @@ def _held(budget: Mapping[str, Any]) -> _Sheet:
 
     precision = budget["precision"]
     rows: list[list[str]] = []
+    doubtful = False
     for requirement in budget["requirements"]:
         cells = [requirement_text(requirement)]
         for reading in ("endpoints", "edge-points"):
-            stretches = [
-                f"{signed(of['from_m'], '.4g')} … {signed(of['to_m'], '.4g')} m" for of in requirement[reading]["holds"]
-            ]
+            stretches = []
+            for of in requirement[reading]["holds"]:
+                mark = "" if of["first_order_holds"] else " ?"
+                stretches.append(f"{signed(of['from_m'], '.4g')} … {signed(of['to_m'], '.4g')} m{mark}")
+                doubtful |= bool(mark)
             cells.append("\n".join(stretches) or "nowhere")
         rows.append(cells)
     note = "the lines are never all in the image"
@@ -305,5 +328,6 @@ def _held(budget: Mapping[str, Any]) -> _Sheet:
         else:
             over = signed(precision["hand_over_m"], ".4g")
             note += f"the threshold leaves the image at {over} m, and with it roll and along"
+    note += f"; {_doubt(budget)}, at one end or both" if doubtful else ""
     px = f"{precision['noise_px']:.3g} px"
     return _Sheet(("requirement", f"endpoints\nholds with {px}", f"edge-points\nholds with {px}"), rows, note)

@@ -18,8 +18,11 @@ from scipy.stats import norm
 
 from landsim import cli, terminal
 from landsim.budget import Budget, Order, Requirement, make_budget, parse_requirement, parse_sweep, setting_of
+from landsim.budget.bias import shifts
+from landsim.budget.drawn import confirm, seed_of
+from landsim.budget.normal import bound_kept, sigma_within
 from landsim.budget.setting import frames_at, hand_over, stage_at
-from landsim.budget.solve import bound_kept, confirm, need, seed_of, shifts, sigma_within
+from landsim.budget.solve import need, needed_noise
 from landsim.config import load_scenario
 from landsim.errors import InputError
 from landsim.study.draws import draw_lines, pose_errors
@@ -86,7 +89,30 @@ class TestGeometry:
         distance = (height - setting.threshold_height) / math.tan(3.0 * DEG)
         shift = shifts(setting, frames_at(setting, "late", np.array([distance])))[0]
         assert shift[OF_STAGE["late"].index("cross")] == pytest.approx(cost, rel=0.03)
-        assert shift[OF_STAGE["late"].index("altitude")] == pytest.approx(0.0, abs=1e-9)
+
+    @pytest.mark.parametrize("roll_error", [2.0, -2.0, 5.0])
+    @pytest.mark.parametrize("height", [7.0, 2.0])
+    def test_what_a_roll_error_costs_in_altitude(self, height: float, roll_error: float) -> None:
+        """The planes of the edges, 15 m to either side, are atan(15/h) from the vertical; both turn about the runway's
+        axis, by the roll error times the cosine of the camera's pitch, and the edges stay 30 m apart."""
+        edge, turned = math.atan(15.0 / height), roll_error * DEG * math.cos(10.0 * DEG)
+        expected = 30.0 / (math.tan(edge + turned) + math.tan(edge - turned)) - height
+        setting = replace(SETTING, roll_error=roll_error * DEG)
+        distance = (height - setting.threshold_height) / math.tan(3.0 * DEG)
+        shift = shifts(setting, frames_at(setting, "late", np.array([distance])))[0]
+        assert shift[OF_STAGE["late"].index("altitude")] == pytest.approx(expected, rel=0.01)
+        assert np.sign(shift[OF_STAGE["late"].index("cross")]) == np.sign(roll_error)
+
+    @pytest.mark.parametrize(("roll_error", "solved"), [(7.4, True), (8.0, False), (-8.0, False)])
+    def test_a_roll_error_that_puts_an_edge_above_the_horizon(self, roll_error: float, solved: bool) -> None:
+        """From 2 m the edges are atan(2/15) = 7.6° below the horizon."""
+        setting = replace(SETTING, roll_error=roll_error * DEG)
+        distance = (2.0 - setting.threshold_height) / math.tan(3.0 * DEG)
+        requirement = parse_requirement(f"altitude=100@{distance}")
+        found = need(setting, requirement, "late", "endpoints", 0.95)
+        assert (found.noise_px is not None) == solved == math.isfinite(found.shift) == math.isfinite(found.now)
+        needed = needed_noise(setting, [requirement], ["late"], 0.95)["endpoints"]
+        assert needed == ([pytest.approx(found.noise_px)] if solved else [0.0])
 
     def test_a_roll_error_no_precision_makes_up_for(self) -> None:
         row = budget_of("cross=0.2@-105", roll_error=0.2 * DEG).rows[0]
@@ -112,6 +138,53 @@ class TestSampling:
         assert p95 == pytest.approx(row.requirement.bound, rel=0.05)
         drawn = confirm(setting, row.requirement, row.stage, reading, noise, 20_000, seed_of(1, 0, reading))
         assert drawn.inside == pytest.approx(0.95, abs=0.006)
+
+    @pytest.mark.parametrize(
+        ("text", "roll_error"),
+        [("altitude=0.2@-100", 2.0), ("altitude=0.15@-100", -2.0), ("cross=2@-60", 2.0), ("yaw=0.9@-80", 3.0),
+         ("pitch=0.15@-60", -4.0)],
+    )  # fmt: skip
+    def test_the_need_meets_the_bound_with_a_large_roll_error(self, text: str, roll_error: float) -> None:
+        row = budget_of(text, roll_error=roll_error * DEG, draws=20_000).rows[0]
+        assert row.inside["endpoints"] == pytest.approx(0.95, abs=0.01)
+        assert row.inside["edge-points"] == pytest.approx(0.95, abs=0.01)
+
+    @pytest.mark.parametrize("reading", READINGS)
+    def test_a_bound_that_the_solver_breaks_by_itself(self, reading: Reading) -> None:
+        """2° cost 0.13 m of altitude at 2 m: with next to no noise every draw is beyond 0.1 m."""
+        row = budget_of("altitude=0.1@-105", roll_error=2.0 * DEG, draws=10).rows[0]
+        assert row.needs[reading].noise_px is None
+        assert (row.inside, row.trusted) == ({}, {})
+        setting = replace(SETTING, roll_error=2.0 * DEG)
+        assert confirm(setting, row.requirement, "late", reading, 1e-3, 100, seed_of(0, 0, reading)).inside == 0.0
+
+    @pytest.mark.parametrize(
+        ("text", "trusted"),
+        [("altitude=100@1000", False), ("along=400@600", False), ("pitch=90@-100", False), ("altitude=0.5@600", True),
+         ("cross=0.5@290", True)],
+    )  # fmt: skip
+    def test_first_order_is_marked_where_drawing_denies_it(self, text: str, trusted: bool) -> None:
+        row = budget_of(text, draws=4000).rows[0]
+        for reading in READINGS:
+            assert row.trusted[reading] == trusted
+            assert (abs(row.inside[reading] - 0.95) < 0.03) == trusted
+
+    @pytest.mark.parametrize("confidence", [20.0, 68.27, 99.0, 99.99])
+    def test_at_any_confidence(self, confidence: float) -> None:
+        for bound, trusted in ((0.1, True), (100.0, False)):
+            rows = [budget_of(f"altitude={bound}@600", confidence_percent=confidence, seed=i).rows[0] for i in range(3)]
+            found = {row.trusted[reading] for row in rows for reading in READINGS}
+            assert found == {trusted}, bound
+
+    def test_the_marks_seed_is_the_commands(self) -> None:
+        """Near the edge of what is trusted chance decides, and the same chance each time."""
+        found = [
+            [budget_of(f"altitude={b}@1000", seed=i).rows[0].trusted["endpoints"] for b in range(5, 60, 3)]
+            for i in (1, 1, 2)
+        ]
+        assert found[0] == found[1]
+        assert found[0][0]
+        assert not found[0][-1]
 
     @pytest.mark.parametrize("text", ["altitude=0.5@400", "yaw=0.1@200", "cross=0.2@-20"])
     def test_so_many_points_meet_the_bound(self, text: str) -> None:
@@ -167,6 +240,21 @@ class TestHeld:
         (along,), (pitch,) = (row.held["endpoints"] for row in budget.rows)
         assert along == pytest.approx((budget.far, budget.hand_over), abs=0.01)
         assert pitch == pytest.approx((budget.far, budget.end))
+
+    def test_where_first_order_is_not_to_be_trusted(self) -> None:
+        near, far = budget_of("altitude=0.3", "altitude=100", precision_px=10.0).rows
+        assert near.held_trusted["edge-points"] == [True]
+        assert far.held_trusted["endpoints"] == [False]
+
+    def test_a_roll_error_ends_it(self) -> None:
+        """2° cost 0.1 m of altitude where 30 / (tan(a + t) + tan(a - t)) - h does, at about 2.65 m."""
+
+        def excess(height: float) -> float:
+            edge, turned = math.atan(15.0 / height), 2.0 * DEG * math.cos(10.0 * DEG)
+            return height - 30.0 / (math.tan(edge + turned) + math.tan(edge - turned)) - 0.1
+
+        ((_, end),) = budget_of("altitude=0.1", precision_px=1e-3, roll_error=2.0 * DEG).rows[0].held["endpoints"]
+        assert SETTING.height(end) == pytest.approx(brentq(excess, 1.0, 6.0), rel=0.02)
 
     def test_nowhere(self) -> None:
         assert budget_of("along=0.001", precision_px=5.0).rows[0].held == {"endpoints": [], "edge-points": []}
@@ -273,6 +361,11 @@ BAD: dict[str, tuple[tuple[str, ...], str]] = {
     "other tables": (("--requirements", "tables.toml"), "requires: unknown key; did you mean require?"),
     "key without unit": (("--requirements", "unit.toml"), "require 2: altitude: unknown key; did you mean altitude_m?"),
     "file's bound": (("--requirements", "zero.toml"), "require 1: cross_m: the bound must be a finite number above 0"),
+    "file's huge bound": (("--requirements", "huge.toml"), "require 1: altitude_m: must be a number of at most 1e+06"),
+    "file's huge range": (("--requirements", "far.toml"), "require 1: range_m: must be a number of at most 1e+06"),
+    "file's endless range": (("--requirements", "endless.toml"), "require 1: range_m: must be a number of at most"),
+    "file's endless bound": (("--requirements", "digits.toml"), "digits.toml: "),
+    "file's large bound": (("--requirements", "large.toml"), "the bound must be below 1e+06 m"),
     "file's type": (("--requirements", "type.toml"), 'require 1: cross_m: must be a number, not "1"'),
 }
 FILES = {
@@ -280,6 +373,11 @@ FILES = {
     "tables.toml": "[[requires]]\nrange_m = 1.0\n",
     "unit.toml": "[[require]]\nrange_m = 600.0\nyaw_deg = 1\n[[require]]\naltitude = 1.0\n",
     "zero.toml": "[[require]]\nrange_m = 600.0\ncross_m = 0\n",
+    "huge.toml": f"[[require]]\nrange_m = 600\naltitude_m = 1{'0' * 400}\n",
+    "far.toml": f"[[require]]\naltitude_m = 1\nrange_m = -1{'0' * 400}\n",
+    "endless.toml": f"[[require]]\naltitude_m = 1\nrange_m = 0x1{'0' * 5000}\n",
+    "digits.toml": f"[[require]]\nrange_m = 600\naltitude_m = 1{'0' * 5000}\n",
+    "large.toml": f"[[require]]\nrange_m = 600\naltitude_m = 1{'0' * 20}\n",
     "type.toml": '[[require]]\nrange_m = 600.0\ncross_m = "1"\n',
     "full/mine": "mine",
     "f.png/mine": "mine",
@@ -372,9 +470,33 @@ class TestCommand:
     def test_a_shift_that_no_precision_makes_up_for_is_told(self, landsim: Run) -> None:
         code, out, _ = landsim("--require", "cross=0.2@-100", "--roll-error-deg", "1")
         assert code == 0
-        assert "no precision will do for cross 0.2 m at −100 m, since the roll error alone costs" in " ".join(
-            out.split()
+        assert (
+            "no precision will do for cross 0.2 m at −100 m, since with the roll error perfect lines are off by"
+            in " ".join(out.split())
         )
+
+    def test_no_pose_with_the_roll_error_is_told(self, landsim: Run) -> None:
+        arguments = ("paper-fig3", "--require", "altitude=10@-105", "--roll-error-deg", "9")
+        code, out, _ = landsim(*arguments, "--confirm", "10")
+        assert code == 0
+        assert "since with the roll error perfect lines tell no pose" in " ".join(out.split())
+        of = json.loads(landsim(*arguments, "--json")[1])["requirements"][0]["endpoints"]
+        keys = ("needed_noise_px", "roll_shift_m", "present_m", "first_order_holds")
+        assert [of[key] for key in keys] == [None] * 4
+
+    def test_a_need_not_to_be_trusted_is_marked(self, landsim: Run) -> None:
+        mark = "? not to be trusted"
+        far, near = (landsim("paper-fig3", "--require", text)[1] for text in ("altitude=100@1000", "altitude=0.5@600"))
+        assert " px ?" in far
+        assert mark in " ".join(far.split())
+        assert "which drawing does not bear out" in " ".join(far.split())
+        assert "?" not in near
+        told = json.loads(landsim("paper-fig3", "--require", "altitude=100@1000", *REQUIRE, "--json")[1])
+        assert [of["endpoints"]["first_order_holds"] for of in told["requirements"]] == [False, True]
+        assert told["checked"]["draws"] == 2000
+        _, out, _ = landsim("paper-fig3", "--require", "altitude=100", "--precision", "10")
+        assert " m ?" in out
+        assert mark in " ".join(out.split())
 
     def test_help_imports_no_library(self) -> None:
         code = (
@@ -410,6 +532,19 @@ class TestFigure:
         (legend,) = figure.legends
         names = [text.get_text() for text in legend.get_texts()]
         assert names[:2] == ["altitude 0.5 m at 600 m", "cross 0.2 m at −20 m"]
+
+    def test_a_mark_not_to_be_trusted_is_hollow(self) -> None:
+        from landsim.budget import as_dict
+        from landsim.plain import as_json
+        from landsim.plots.budget import budget_sweeps
+
+        hollow = []
+        for texts in (("altitude=0.5@600",), ("altitude=0.5@600", "altitude=100@1000")):
+            figure = budget_sweeps(as_json(as_dict(budget_of(*texts, sweeps=("tilt=0:5:3",)))))
+            marks = [line for panel in figure.axes for line in panel.get_lines() if line.get_linestyle() == "None"]
+            hollow.append([line.get_markerfacecolor() == "white" for line in marks])
+            assert any("Hollow" in text.get_text() for text in figure.texts) == any(hollow[-1])
+        assert hollow == [[False, False], [False, True] * 2]
 
     def test_what_a_colour_tells_line_and_mark_tell_too(self) -> None:
         from landsim.plots.budget import CURVES

@@ -334,7 +334,7 @@ class TestRoundTrip:
                 "study.ranges_m": st.lists(_finite(-1e5, 1e5), unique=True, min_size=1, max_size=5).map(
                     lambda ranges: sorted(ranges, reverse=True)
                 ),
-                "study.roll_errors_deg": st.lists(_finite(-20.0, 20.0), min_size=1, max_size=3),
+                "study.roll_errors_deg": st.lists(_finite(-20.0, 20.0), unique=True, min_size=1, max_size=3),
                 "study.flights": st.integers(0, 100_000),
                 "study.bounds.cross_m": _finite(1e-6, 1e6),
                 "study.bounds_late.yaw_deg": _finite(1e-6, 90.0),

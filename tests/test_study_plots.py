@@ -1,6 +1,7 @@
 """The figures of a study: what they show is the numbers, at a size that prints, in the same bytes every time."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from landsim.plots.envelope import draw_envelopes, envelope_figure
 from landsim.plots.tilt import draw_tilt, tilt_figure
-from landsim.study.model import OF_STAGE, READINGS, Envelope, Reading, Source, StageName
+from landsim.study.model import OF_STAGE, READINGS, SOURCES, Envelope, Reading, Source, StageName
 
 Array = NDArray[np.float64]
 DEGREE = math.pi / 180.0
@@ -127,9 +128,9 @@ def test_curves_are_magnitudes_in_degrees_and_metres() -> None:
         x, y = line(axes, "vision, one realisation")
         np.testing.assert_array_equal(x, vision.distance)
         np.testing.assert_allclose(y, np.abs(vision.single[:, k]) / unit)
-        np.testing.assert_allclose(line(axes, "Cramér–Rao bound, 1.96 σ")[1], 1.96 * vision.sigma[:, k] / unit)
+        np.testing.assert_allclose(line(axes, "Cramér–Rao bound, 1.96 σ")[1], 1.96 * vision.sigma[:, k] / unit, 1e-4)
         np.testing.assert_allclose(line(axes, "fused, 95 % of n = 100")[1], fused.percentiles[:, k, 1] / unit)
-        np.testing.assert_allclose(line(axes, "fused, 1.96 σ of the filter")[1], 1.96 * fused.sigma[:, k] / unit)
+        np.testing.assert_allclose(line(axes, "fused, 1.96 σ of the filter")[1], 1.96 * fused.sigma[:, k] / unit, 1e-4)
         np.testing.assert_allclose(line(axes, "fused, one flight")[1], np.abs(fused.single[:, k]) / unit)
         bands = {str(c.get_label()): c for c in axes.collections if isinstance(c, PolyCollection)}
         assert list(bands) == [f"vision, {level} % of n = 1000" for level in ("68.3", "95", "99.7")]
@@ -138,6 +139,14 @@ def test_curves_are_magnitudes_in_degrees_and_metres() -> None:
             assert vertices[:, 1].max() == pytest.approx(vision.percentiles[:, k, i].max() / unit)
     assert line(panel(figure, "roll"), "claimed bound")[1][0] == pytest.approx(0.8)
     assert not [one for one in panel(figure, "along").lines if one.get_label() == "claimed bound"]  # none is claimed
+
+
+def test_a_percentile_of_too_few_is_not_drawn() -> None:
+    vision, fused = (replace(envelope("early", source=source), count=np.full(97, 19)) for source in SOURCES)
+    axes = panel(envelope_figure("early", [vision, fused], BOUNDS["early"], "fig"), "yaw", 0)
+    bands = [str(c.get_label()) for c in axes.collections if isinstance(c, PolyCollection)]
+    assert bands == ["vision, 68.3 % of n = 19"]
+    assert not [one for one in axes.lines if str(one.get_label()).startswith("fused, 95 %")]
 
 
 def test_distance_falls_to_the_right_with_the_time_above_it() -> None:

@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 from approach import paper
 from numpy.random import SeedSequence, default_rng
+from scipy.stats import binomtest
 
 from estimator.so3 import Array
 from landsim.config import load_scenario
+from landsim.sensors import camera_of
 from landsim.study import precision
-from landsim.study.envelope import sampled
+from landsim.study.envelope import first_order, sampled
 from landsim.study.frames import at_distances, straight_approach
-from landsim.study.model import OF_STAGE, Envelope, StageName
-from landsim.study.precision import holds_from, required_precision
+from landsim.study.holding import holds_from, holds_from_interval
+from landsim.study.model import OF_STAGE, READINGS, Envelope, Reading, StageName
+from landsim.study.precision import required_precision, wilson
 from landsim.units import DEG
 
 ROOT2 = math.sqrt(2.0)
@@ -29,9 +32,10 @@ def made(p95: Array, distance: Array, stage: StageName = "early") -> Envelope:
     names = OF_STAGE[stage]
     n, k = len(p95), len(names)
     levels = np.repeat(np.stack((0.5 * p95, p95, 1.5 * p95), axis=-1)[:, None], k, axis=1)
-    zero, empty = np.zeros(n), np.zeros((n, k))
+    count, empty = np.full(n, 1000), np.zeros((n, k))
+    height = 7.6 + 0.0524 * distance
     return Envelope(
-        stage, "endpoints", "vision", 0.0, names, distance, np.arange(n) / 30.0, zero, zero, levels, empty, empty
+        stage, "endpoints", "vision", 0.0, names, distance, np.arange(n) / 30.0, height, count, levels, empty, empty
     )
 
 
@@ -77,6 +81,55 @@ def test_past_the_threshold() -> None:
     p95 = np.exp((distance + 20.0) / 50.0) * np.exp(0.03 * default_rng(1).standard_normal(distance.size))
     assert holds_from(made(p95, distance, "late"), "pitch", 1.0) == pytest.approx(-20.0, abs=1.5)
     assert holds_from(made(p95, distance, "late"), "pitch", 5.0) == 37.0
+
+
+@pytest.mark.parametrize("reading", READINGS)
+@pytest.mark.parametrize("end", [2.0, 1.0, 0.5])
+@pytest.mark.parametrize("quantity", ["yaw", "cross"])
+def test_the_end_of_the_late_stage_decides(quantity: str, end: float, reading: Reading) -> None:
+    """Errors grow as one over the height there; the exact first order, with a bound a hair off the end's."""
+    scenario = paper(study__end_height_m=end)
+    late, settings = straight_approach(scenario)[1], scenario.camera
+    sigma = first_order(camera_of(settings), late, reading, settings.point_spacing_px, settings.noise_px, 30.0)
+    p95 = 1.96 * sigma[:, OF_STAGE["late"].index(quantity)]
+    envelope = made(p95, late.distance, "late")
+    envelope.height[:] = late.height
+    assert int(np.argmax(p95)) == len(late) - 1
+    assert holds_from(envelope, quantity, 0.997 * p95[-1]) is None
+    assert holds_from(envelope, quantity, 1.003 * p95[-1]) == late.distance[0]
+
+
+def test_the_last_frames_must_not_contradict_the_regression() -> None:
+    """A bound that breaks within the last frame, by more than a thousand draws do by chance: three times 3.0 %."""
+    distance = np.arange(1000.0, 900.0, -0.5)  # the regression at the end is over two hundred frames
+    p95 = np.full(distance.size, 0.9)
+    for excess, expected in ((1.05, 1000.0), (1.12, None)):
+        p95[-1] = excess
+        assert holds_from(made(p95, distance), "yaw", 1.0) == expected
+
+
+def test_the_interval_over_flights_is_that_of_the_order_statistic() -> None:
+    """Errors in proportion to the distance, to a flight's own factor: the bound is met at the bound over its p95.
+
+    The interval of the p95 of 100, by the binomial distribution, is between the 90th and the 99th of them.
+    """
+    distance, bound = np.arange(1000.0, 100.0, -10.0), 0.5
+    factor = 1e-3 * np.sort(np.abs(default_rng(2).standard_normal(100)))
+    size = factor[:, None] * distance
+    envelope = made(np.quantile(size, 0.95, axis=0), distance)
+    low, high = holds_from_interval(envelope, size, bound, SeedSequence(1))
+    assert low is not None
+    assert high is not None
+    assert bound / factor[99] - 1e-6 <= low <= bound / factor[96] + 1e-6
+    assert bound / factor[91] - 1e-6 <= high <= min(bound / factor[87], 1000.0) + 1e-6
+    assert (low, high) == holds_from_interval(envelope, size, bound, SeedSequence(1))
+    assert holds_from_interval(envelope, size, 1e-3, SeedSequence(1)) == (None, None)
+    assert holds_from_interval(envelope, size, 1e3, SeedSequence(1)) == (1000.0, 1000.0)
+    gaps = size.copy()
+    gaps[:50, :20] = math.nan  # half of them are not there yet, and the others have no solution
+    gaps[50:, :20] = math.inf
+    _, high = holds_from_interval(envelope, gaps, 1e3, SeedSequence(1))
+    assert high == pytest.approx(distance[20])
 
 
 def test_a_few_exact_ranges_are_interpolated() -> None:
@@ -185,6 +238,33 @@ def test_too_many_points_to_draw_are_not_confirmed() -> None:
     assert not found.confirmed
 
 
+@pytest.mark.parametrize(("kept", "draws"), [(95, 100), (190, 200), (200, 200), (0, 50), (19_000, 20_000)])
+def test_interval_of_a_share(kept: int, draws: int) -> None:
+    expected = binomtest(kept, draws).proportion_ci(0.95, method="wilson")
+    assert wilson(kept / draws, draws) == pytest.approx((expected.low, expected.high), abs=1e-12)
+
+
+def test_no_draws_say_nothing_of_a_share() -> None:
+    assert all(math.isnan(end) for end in wilson(math.nan, 0))
+
+
+@pytest.mark.parametrize(
+    ("shares", "at_most", "told"),
+    [
+        ([0.95], True, True),
+        ([0.93], True, False),  # by 4.1 standard errors of 2000 draws, 0.49 %
+        ([0.97], True, False),
+        ([0.97], False, True),
+        ([0.97, 0.953], True, True),  # one of them is where the bound is met
+        ([0.95, 0.93], True, False),
+    ],
+)
+def test_a_confirmation_has_two_sides(shares: list[float], at_most: bool, told: bool) -> None:
+    checks = [precision._Check(0, 2000, 0.0, share) for share in shares]
+    assert precision.confirmed(checks, at_most=at_most) is told
+    assert not precision.confirmed([*checks, precision._Check(1, 0, math.nan, math.nan)], at_most=at_most)
+
+
 def test_what_cannot_be_asked() -> None:
     scenario = paper()
     late = at_distances(scenario, "late", [30.0])
@@ -196,3 +276,9 @@ def test_what_cannot_be_asked() -> None:
         required_precision(paper(camera__noise_px=0.0), late, "yaw", "edge-points", 0.1, SeedSequence(1))
     with pytest.raises(ValueError, match="has no ranges"):
         required_precision(load_scenario("landing"), late, "yaw", "endpoints", 0.1, SeedSequence(1))
+
+
+def test_a_bound_out_of_reach_is_not_drawn() -> None:
+    scenario = paper()
+    frames = at_distances(scenario, "early", [1000.0])
+    assert required_precision(scenario, frames, "yaw", "edge-points", 1e-9, SeedSequence(1), draws=100) is None

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from landsim.errors import InputError, RunFolderError, ScenarioError
 from landsim.runs import load_flight
 from landsim.simulate import fly
 from landsim.study.folder import load_envelopes, read_study, save_envelopes, write_study
+from landsim.study.markdown import verdict_md
 from landsim.study.model import OF_STAGE, Envelope
 from landsim.study.plan import plan_of
 from landsim.study.run import StudyResult, run_study
@@ -149,7 +151,10 @@ class TestRun:
         assert (flights["first_seed"], flights["last_seed"], flights["outcomes"]) == (7, 8, {"timeout": 2})
         fused = [e for e in result.verdict["entries"] if (e["source"], e["quantity"]) == ("fused", "cross")]
         assert [row["count"] for row in fused[0]["listed"]] == [2, 2]
-        assert 0.0 < fused[0]["listed"][-1]["p95"] < 5.0
+        # two flights have no 95th percentile, and no bound can be said to hold
+        assert fused[0]["listed"][-1]["p95"] is None
+        assert {e["holds"] for e in result.verdict["entries"]} == {None}
+        assert "| too few flights |" in verdict_md(result.verdict)
         assert result.verdict["draws"] is None
         assert all(e["precision"] is None for e in result.verdict["entries"])
 
@@ -234,7 +239,7 @@ class TestFolder:
         same(load_envelopes(folder / "envelopes.parquet", listed=True), early.listed)
 
     def test_gaps_and_whole_numbers_survive(self, tmp_path: Path, late: StudyResult) -> None:
-        envelopes = late.envelopes
+        envelopes = tuple(replace(one, percentiles=one.percentiles.copy()) for one in late.envelopes)
         envelopes[0].percentiles[3:5] = np.nan
         envelopes[0].percentiles[6] = np.inf
         save_envelopes(tmp_path / "e.parquet", envelopes, ())
@@ -347,6 +352,15 @@ class TestCommandLine:
         ("arguments", "told"),
         [
             (("run", "paper-fig3", "--set", "study.ranges_m=[2000.0]"), "study.ranges_m: must be within"),
+            (
+                ("run", "paper-fig3", "--set", "study.readings=['endpoints', 'endpoints']"),
+                "study.readings: must not repeat any, not ['endpoints', 'endpoints']",
+            ),
+            (
+                ("run", "paper-fig4", "--set", "study.roll_errors_deg=[0.0, 0.2, 0.2]"),
+                "study.roll_errors_deg: must not repeat any, not [0.0, 0.2, 0.2]",
+            ),
+            (("run", "paper-fig4", "--set", "study.roll_errors_deg=[0.0, 1e6]"), "study.roll_errors_deg"),
             (("run", "paper-fig3", "--set", "study.darws=1"), "did you mean study.draws?"),
             (("run", "paper-fig3", "--out", "done"), "done: already holds a run"),
             (("run", "paper-fig3", "--seed", "x"), "must be a whole number"),

@@ -7,9 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from estimator.so3 import Array
+from landsim.budget.bias import believed, shifts
+from landsim.budget.normal import bisected, bound_kept
 from landsim.budget.requirements import Requirement
 from landsim.budget.setting import Setting, frames_at, hand_over
-from landsim.budget.solve import bisected, bound_kept, gains, shifts
+from landsim.budget.solve import gains
 from landsim.study.frames import Frames
 from landsim.study.model import OF_STAGE, READINGS, Reading
 
@@ -46,11 +48,14 @@ def course(setting: Setting) -> Course:
         distances[1] = np.linspace(begin, end, GRID)
     early = frames_at(setting, "early", distances[0])
     late = frames_at(setting, "late", distances[1])
-    both = (early, late)
+    moved = [(frames, shifts(setting, frames)) for frames in (early, late)]
     return Course(
-        distance=np.concatenate([frames.distance for frames in both]),
-        gain={r: np.concatenate([_in_six(gains(setting, frames, r), frames) for frames in both]) for r in READINGS},
-        shift=np.concatenate([_in_six(shifts(setting, frames), frames) for frames in both]),
+        distance=np.concatenate([frames.distance for frames, _ in moved]),
+        gain={
+            r: np.concatenate([_in_six(gains(setting, believed(setting, f, s), r), f) for f, s in moved])
+            for r in READINGS
+        },
+        shift=np.concatenate([_in_six(s, f) for f, s in moved]),
         hand_over=over,
     )
 

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from landsim.errors import InputError, did_you_mean, is_text, nearest, shown
+from landsim.budget.typed import taken_apart
+from landsim.errors import InputError, did_you_mean, nearest, shown
 from landsim.schema import LARGEST
 from landsim.study.model import QUANTITIES, Quantity
 
@@ -47,12 +48,9 @@ def parse_requirement(text: str) -> Requirement:
     InputError
         If it is none.
     """
-    what = f'requirement "{text}"'
-    if not is_text(text):
-        raise InputError(f"{what}: must be UTF-8 text")
-    name, equals, rest = (part.strip() for part in text.partition("="))
-    bound, at, distance = (part.strip() for part in rest.partition("@"))
-    if not (name and equals and bound) or (at and not distance):
+    what, name, rest = taken_apart("requirement", text)
+    bound, at, distance = (part.strip() for part in (rest or "").partition("@"))
+    if not (name and bound) or (at and not distance):
         raise InputError(f"{what}: must be quantity=bound@range, in degrees and metres, such as {EXAMPLE}")
     values = []
     for part, meaning in ((bound, "bound"), (distance, "range")):
@@ -93,16 +91,25 @@ def _of_tables(content: Mapping[str, Any], path: Path) -> Iterator[Requirement]:
     keys = {f"{q.name}_{q.unit}": q for q in QUANTITIES.values()}
     for i, table in enumerate(tables, 1):
         place = f"{path}: {TABLE} {i}"
+        numbers: dict[str, float] = {}
         for key, value in table.items():
             if key != RANGE_KEY and key not in keys:
                 raise InputError(f"{place}: {key}: unknown key{_meant(key, [*keys, RANGE_KEY])}")
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                raise InputError(f"{place}: {key}: must be a number, not {shown(value)}")
+            numbers[key] = _number(value, f"{place}: {key}")
         if not any(key in keys for key in table):
             raise InputError(f"{place}: has no bound; known: {', '.join(keys)}")
-        for key, value in table.items():
+        for key, number in numbers.items():
             if key != RANGE_KEY:
-                yield _requirement(keys[key], value, table.get(RANGE_KEY), f"{place}: {key}")
+                yield _requirement(keys[key], number, numbers.get(RANGE_KEY), f"{place}: {key}")
+
+
+def _number(value: object, what: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"{what}: must be a number, not {shown(value)}")
+    try:
+        return float(value)
+    except OverflowError:  # Python's integers, and so those of its TOML, have no end
+        raise InputError(f"{what}: must be a number of at most {LARGEST:g} in size") from None
 
 
 def _quantity(name: str, what: str) -> Quantity:
@@ -129,4 +136,4 @@ def _requirement(quantity: Quantity, bound: float | None, distance: float | None
         raise InputError(f"{what}: the bound must be below {largest:g} {quantity.unit}, not {bound:g}")
     if distance is not None and not (math.isfinite(distance) and abs(distance) <= LARGEST):
         raise InputError(f"{what}: the range must be a finite number of metres, not {distance:g}")
-    return Requirement(quantity, bound * quantity.scale, None if distance is None else float(distance), what)
+    return Requirement(quantity, bound * quantity.scale, distance, what)

@@ -5,11 +5,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from numpy.random import SeedSequence
+
 from landsim import __version__
 from landsim.budget.course import course, held
+from landsim.budget.drawn import CHECK_DRAWS, OF_CHECK, OF_HELD, OFF_BY, confirm, holds_when_drawn, seed_of
 from landsim.budget.requirements import EXAMPLE, Requirement
-from landsim.budget.setting import Setting, required_stage, setting_of
-from landsim.budget.solve import Need, confirm, need, seed_of
+from landsim.budget.setting import Setting, required_stage, setting_of, stage_at
+from landsim.budget.solve import Need, moments, need
 from landsim.budget.sweep import Sweep, SweepOrder, sweep
 from landsim.config import Scenario
 from landsim.errors import InputError
@@ -18,7 +21,7 @@ from landsim.study.model import READINGS, Reading, StageName
 from landsim.units import DEG
 
 LARGEST_ROLL_ERROR = 10.0 * DEG
-"""First order says nothing beyond it, rad."""
+"""No roll angle that is worth having is so wrong, rad."""
 MOST_DRAWS = 1_000_000
 
 
@@ -36,6 +39,7 @@ class Order(NamedTuple):
     draws: int = 0
     """With which each need is confirmed; none if 0."""
     seed: int = 0
+    """Of these draws and of those that first order is checked with."""
 
 
 @dataclass(frozen=True)
@@ -49,17 +53,23 @@ class Row:
         None, and ``needs`` empty, for a requirement without a distance.
     needs : dict
         By reading.
+    trusted : dict
+        By reading: whether drawing bears the need out; without an entry where no precision will do.
     inside : dict
         By reading: the share of the draws within the bound; empty if nothing was drawn.
     held : dict
         By reading: from and to where the bound holds, m; empty if no precision was given.
+    held_trusted : dict
+        By reading: whether drawing bears out both ends of each of these stretches.
     """
 
     requirement: Requirement
     stage: StageName | None
     needs: dict[Reading, Need]
+    trusted: dict[Reading, bool]
     inside: dict[Reading, float]
     held: dict[Reading, list[tuple[float, float]]]
+    held_trusted: dict[Reading, list[bool]]
 
 
 @dataclass(frozen=True)
@@ -122,11 +132,18 @@ def make_budget(scenario: Scenario, order: Order, tick: Callable[[str], None] = 
     rows = []
     for i, (requirement, stage) in enumerate(zip(order.requirements, stages, strict=True)):
         needs: dict[Reading, Need] = {}
+        trusted: dict[Reading, bool] = {}
         inside: dict[Reading, float] = {}
+        kept_trusted: dict[Reading, list[bool]] = {}
         kept: dict[Reading, list[tuple[float, float]]] = {}
         for reading in READINGS:
             if stage is not None:
                 needs[reading] = found = need(setting, requirement, stage, reading, confidence)
+                if found.noise_px is not None:
+                    trusted[reading] = holds_when_drawn(
+                        setting, requirement, stage, reading, found.noise_px, found.gain * found.noise_px, found.shift,
+                        seed_of(order.seed, i, reading, OF_CHECK),
+                    )  # fmt: skip
                 if order.draws and found.noise_px is not None:
                     seed = seed_of(order.seed, i, reading)
                     drawn = confirm(setting, requirement, stage, reading, found.noise_px, order.draws, seed)
@@ -134,7 +151,12 @@ def make_budget(scenario: Scenario, order: Order, tick: Callable[[str], None] = 
                     tick(f"drawing {requirement}")
             if along is not None and order.precision_px is not None:
                 kept[reading] = held(along, requirement, reading, order.precision_px, confidence)
-        rows.append(Row(requirement, stage, needs, inside, kept))
+                seed = seed_of(order.seed, i, reading, OF_HELD)
+                kept_trusted[reading] = [
+                    all(_holds_at(setting, requirement, reading, order.precision_px, end, seed) for end in stretch)
+                    for stretch in kept[reading]
+                ]
+        rows.append(Row(requirement, stage, needs, trusted, inside, kept, kept_trusted))
     sweeps = tuple(
         sweep(
             scenario,
@@ -188,6 +210,7 @@ def as_dict(budget: Budget) -> dict[str, Any]:
         "requirements": [_row_as_dict(row, setting) for row in budget.rows],
         "binding": {reading: budget.binding(reading) for reading in READINGS},
         "sweeps": [_sweep_as_dict(one) for one in budget.sweeps],
+        "checked": {"draws": CHECK_DRAWS, "seed": order.seed, "off_by_percent": 100.0 * OFF_BY},
         "versions": {"landsim": __version__},
     }
     if order.precision_px is not None:
@@ -218,6 +241,17 @@ def _check(order: Order) -> None:
         raise InputError(f"the draws must be 1 to {MOST_DRAWS}, not {order.draws}")
 
 
+def _holds_at(
+    setting: Setting, requirement: Requirement, reading: Reading, noise_px: float, distance: float, seed: SeedSequence
+) -> bool:
+    """Whether drawing bears first order out where a bound is kept with a σ of the points."""
+    there, stage = requirement._replace(distance=distance), stage_at(setting, distance)
+    if stage is None:
+        return False
+    gain, shift = moments(setting, there, stage, reading)
+    return holds_when_drawn(setting, there, stage, reading, noise_px, gain * noise_px, shift, seed)
+
+
 def _row_as_dict(row: Row, setting: Setting) -> dict[str, Any]:
     requirement, unit = row.requirement, row.requirement.quantity.unit
     scale = requirement.quantity.scale
@@ -237,6 +271,7 @@ def _row_as_dict(row: Row, setting: Setting) -> dict[str, Any]:
                 f"roll_shift_{unit}": found.shift / scale,
                 f"present_{unit}": found.now / scale,
                 "needed_noise_px": found.noise_px,
+                "first_order_holds": row.trusted.get(reading),
                 "present_points": list(found.points_now),
             }
             if reading == "edge-points":
@@ -247,7 +282,10 @@ def _row_as_dict(row: Row, setting: Setting) -> dict[str, Any]:
         if reading in row.inside:
             of["inside_percent"] = 100.0 * row.inside[reading]
         if row.held:
-            of["holds"] = [{"from_m": begin, "to_m": end} for begin, end in row.held[reading]]
+            of["holds"] = [
+                {"from_m": begin, "to_m": end, "first_order_holds": trusted}
+                for (begin, end), trusted in zip(row.held[reading], row.held_trusted[reading], strict=True)
+            ]
         result[reading] = of
     return result
 

@@ -1,34 +1,27 @@
-"""What a line must be worth for a bound to hold, to first order, and what drawing the noise makes of it.
+"""What a line must be worth for a bound to hold, to first order in the noise.
 
 To first order an error is normal with a standard deviation in proportion to that of the points, σ_error = g σ_px, about
-a shift b that a wrong roll angle makes late.  A bound B holds in a share p of the frames if
-
-    Φ((B - b) / σ_error) - Φ((-B - b) / σ_error) = p,
-
-which without a shift is σ_error = B / z, z = Φ⁻¹((1 + p) / 2).  More points of the same noise make g smaller, by
-about the root of their number.
+a shift that a wrong roll angle makes late.  The shift is the solver's own, and g is that at the shifted pose.  More
+points of the same noise make g smaller, by about the root of their number.
 """
 
 import math
 from collections.abc import Callable, Sequence
-from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
-from numpy.random import SeedSequence, default_rng
 
-from estimator.covariance import LEFT, RIGHT, LineNoise, two_line_covariance
 from estimator.so3 import Array
+from landsim.budget.bias import believed, shifts
+from landsim.budget.normal import bisected, bound_kept, sigma_within
 from landsim.budget.requirements import Requirement
 from landsim.budget.setting import Setting, frames_at
 from landsim.errors import InputError
 from landsim.sensors import number_of_points
-from landsim.study.draws import draw_lines, pose_errors
-from landsim.study.envelope import child, first_order
+from landsim.study.envelope import first_order
 from landsim.study.frames import LINES_OF_STAGE, Frames
 from landsim.study.model import OF_STAGE, READINGS, Reading, StageName
 
-NORMAL = NormalDist()
 FINEST_PX = 1e-9
 """No spacing of points is looked for below this."""
 
@@ -41,7 +34,7 @@ class Need(NamedTuple):
     gain : float
         Standard deviation of the error per px of the points', m/px or rad/px.
     shift : float
-        Size of the error that the roll error makes, m or rad.
+        Error that the roll error makes, m or rad.  It, ``gain`` and ``now`` are NaN if with it there is no pose.
     now : float
         What the error stays within with the scenario's noise, at the confidence, m or rad.
     noise_px : float or None
@@ -62,67 +55,8 @@ class Need(NamedTuple):
     points: tuple[int, ...] | None
 
 
-class Confirmed(NamedTuple):
-    """What became of a requirement when its need was drawn."""
-
-    inside: float
-    """Share of the draws within the bound."""
-    draws: int
-
-
-def inside(sigma: float, shift: float, bound: float) -> float:
-    """Probability that a normal error of this σ about this shift is within ± bound."""
-    if sigma <= 0.0:
-        return 1.0 if abs(shift) <= bound else 0.0
-    return NORMAL.cdf((bound - shift) / sigma) - NORMAL.cdf((-bound - shift) / sigma)
-
-
-def sigma_within(bound: float, shift: float, confidence: float) -> float | None:
-    """The greatest σ with which so large a share stays within ± bound; None if the shift alone is beyond it."""
-    shift = abs(shift)
-    if shift == 0.0:
-        return bound / NORMAL.inv_cdf(0.5 + 0.5 * confidence)
-    if shift >= bound:
-        return None
-    # the share falls with σ, and no shift leaves it larger than none does
-    return bisected(
-        lambda s: inside(s, shift, bound) >= confidence, 0.0, bound / NORMAL.inv_cdf(0.5 + 0.5 * confidence)
-    )
-
-
-def bound_kept(sigma: float, shift: float, confidence: float) -> float:
-    """The bound within which so large a share stays."""
-    half = sigma * NORMAL.inv_cdf(0.5 + 0.5 * confidence)
-    if shift == 0.0 or not math.isfinite(sigma):
-        return half
-    return bisected(lambda bound: inside(sigma, shift, bound) < confidence, half, half + abs(shift))
-
-
-def shifts(setting: Setting, frames: Frames) -> Array:
-    """Size (n, k) of the errors that the setting's roll error makes, of the quantities of the frames' stage."""
-    n, k = len(frames), len(OF_STAGE[frames.stage])
-    if frames.stage == "early" or setting.roll_error == 0.0:
-        return np.zeros((n, k))
-    # lines without noise: what is left of the covariance is the roll's share
-    middle = 0.5 * (frames.ends[..., :2] + frames.ends[..., 2:])
-    left, right = (LineNoise(middle[:, line, 0], middle[:, line, 1], 0.0, 0.0) for line in (LEFT, RIGHT))
-    covariance = two_line_covariance(
-        setting.camera,
-        left,
-        right,
-        lateral=frames.position[:, 1],
-        height=frames.height,
-        R_cam_from_runway=frames.R_cam_from_runway,
-        runway_width=setting.runway.width,
-        roll_variance=setting.roll_error**2,
-    )
-    yaw, pitch, cross, altitude = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1).T)
-    of = {"pitch": pitch, "yaw": yaw, "cross": cross, "altitude": altitude}
-    return np.stack([of[name] for name in OF_STAGE["late"]], axis=-1)
-
-
 def gains(setting: Setting, frames: Frames, reading: Reading, spacing_px: float | None = None) -> Array:
-    """Standard deviation (n, k) of the errors per px of the points'."""
+    """Standard deviation (n, k) of the errors per px of the points', for the camera where the frames have it."""
     spacing = setting.spacing_px if spacing_px is None else spacing_px
     return first_order(setting.camera, frames, reading, spacing, 1.0, setting.runway.width)
 
@@ -153,15 +87,23 @@ def needed_noise(
         if not which:
             continue
         frames = frames_at(setting, stage, np.array([requirements[i].distance for i in which], float))
-        shift = shifts(setting, frames)
+        shift, seen = shifts(setting, frames), frames.seen()
         for reading in READINGS:
-            gain = gains(setting, frames, reading)
+            gain = gains(setting, believed(setting, frames, shift), reading)
             for row, i in enumerate(which):
                 column = OF_STAGE[stage].index(requirements[i].quantity.name)
-                if math.isfinite(gain[row, column]):
-                    sigma = sigma_within(requirements[i].bound, float(shift[row, column]), confidence)
-                    needed[reading][i] = 0.0 if sigma is None else sigma / float(gain[row, column])
+                sigma = sigma_within(requirements[i].bound, float(shift[row, column]), confidence)
+                if seen[row] and sigma is None:
+                    needed[reading][i] = 0.0
+                elif sigma is not None and math.isfinite(gain[row, column]):
+                    needed[reading][i] = sigma / float(gain[row, column])
     return needed
+
+
+def moments(setting: Setting, requirement: Requirement, stage: StageName, reading: Reading) -> tuple[float, float]:
+    """Standard deviation per px and mean of a requirement's error at its distance, m or rad."""
+    frames, shift, column = _moved(setting, requirement, stage)
+    return float(gains(setting, frames, reading)[0, column]), shift
 
 
 def need(setting: Setting, requirement: Requirement, stage: StageName, reading: Reading, confidence: float) -> Need:
@@ -176,12 +118,10 @@ def need(setting: Setting, requirement: Requirement, stage: StageName, reading: 
     """
     if requirement.distance is None:
         raise ValueError("a requirement without a distance needs no particular precision")
-    frames = frames_at(setting, stage, np.array([requirement.distance]))
-    column = OF_STAGE[stage].index(requirement.quantity.name)
+    frames, shift, column = _moved(setting, requirement, stage)
     gain = float(gains(setting, frames, reading)[0, column])
-    if not math.isfinite(gain):
+    if math.isfinite(shift) and not math.isfinite(gain):
         raise InputError(f"{requirement.source}: at {requirement.distance:g} m the lines do not tell a pose")
-    shift = float(shifts(setting, frames)[0, column])
     sigma = sigma_within(requirement.bound, shift, confidence)
     lengths = [math.hypot(end[2] - end[0], end[3] - end[1]) for end in frames.ends[0, LINES_OF_STAGE[stage]].tolist()]
 
@@ -205,31 +145,12 @@ def need(setting: Setting, requirement: Requirement, stage: StageName, reading: 
     )
 
 
-def confirm(
-    setting: Setting,
-    requirement: Requirement,
-    stage: StageName,
-    reading: Reading,
-    noise_px: float,
-    draws: int,
-    seed: SeedSequence,
-) -> Confirmed:
-    """Draw the points of one frame many times with a σ, and count the errors within the bound."""
-    if requirement.distance is None:
-        raise ValueError("a requirement without a distance cannot be drawn")
-    frames = frames_at(setting, stage, np.array([requirement.distance]))
+def _moved(setting: Setting, requirement: Requirement, stage: StageName) -> tuple[Frames, float, int]:
+    """The frame of a requirement from where the roll error has the camera, its error by that, and its column."""
+    frames = frames_at(setting, stage, np.array([requirement.distance], float))
     column = OF_STAGE[stage].index(requirement.quantity.name)
-    fits = draw_lines(
-        frames.ends[0], LINES_OF_STAGE[stage], reading, setting.spacing_px, noise_px, draws, default_rng(seed)
-    )
-    roll_error = setting.roll_error if stage == "late" else 0.0
-    errors = pose_errors(setting.camera, frames, 0, fits, setting.runway.width, roll_error)[:, column]
-    return Confirmed(float(np.mean(np.abs(errors) <= requirement.bound)), draws)
-
-
-def seed_of(seed: int, requirement: int, reading: Reading) -> SeedSequence:
-    """The seed of a requirement's draws, by its number: the others' do not change it."""
-    return child(SeedSequence(seed), requirement, READINGS.index(reading))
+    shift = shifts(setting, frames)
+    return believed(setting, frames, shift), float(shift[0, column]), column
 
 
 def _widest_spacing(holds: Callable[[float], bool], length: float) -> float | None:
@@ -243,11 +164,3 @@ def _widest_spacing(holds: Callable[[float], bool], length: float) -> float | No
         if narrow < FINEST_PX:
             return None
     return bisected(holds, narrow, wide)
-
-
-def bisected(holds: Callable[[float], bool], good: float, bad: float) -> float:
-    """The last value, from good toward bad, that holds."""
-    for _ in range(60):
-        middle = 0.5 * (good + bad)
-        good, bad = (middle, bad) if holds(middle) else (good, middle)
-    return good

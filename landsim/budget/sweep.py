@@ -11,8 +11,9 @@ from pydantic import ValidationError
 from landsim.budget.requirements import Requirement
 from landsim.budget.setting import Setting, setting_of, stage_at, why_not_seen
 from landsim.budget.solve import needed_noise
+from landsim.budget.typed import taken_apart
 from landsim.config import Scenario
-from landsim.errors import InputError, did_you_mean, is_text, what_is_wrong
+from landsim.errors import InputError, did_you_mean, what_is_wrong
 from landsim.schema import CameraConfig, RunwayConfig, Section
 from landsim.study.model import Reading, StageName
 from landsim.units import DEG
@@ -87,15 +88,12 @@ def parse_sweep(text: str) -> SweepOrder:
     InputError
         If it is none.
     """
-    what = f'sweep "{text}"'
-    if not is_text(text):
-        raise InputError(f"{what}: must be UTF-8 text")
-    name, equals, rest = (part.strip() for part in text.partition("="))
+    what, name, rest = taken_apart("sweep", text)
     keys = {p.key: p for p in PARAMETERS.values() if p.key} | PARAMETERS
     parameter = keys.get(name)
     if parameter is None:
         raise InputError(f'{what}: nothing called "{name}" can be swept{did_you_mean(name, list(keys))}')
-    if not equals:
+    if rest is None:
         return SweepOrder(parameter, None, None, VALUES, what)
     right = f"must be {name}=low:high or {name}=low:high:values, in {parameter.unit}"
     parts = [part.strip() for part in rest.split(":")]

@@ -59,8 +59,13 @@ def binding_text(budget: Mapping[str, Any]) -> str:
         needed = requirement[reading]["needed_noise_px"]
         name = requirement_text(requirement)
         if needed is None:
-            shift = amount(requirement[reading][f"roll_shift_{unit_of(requirement)}"], unit_of(requirement), ".3g")
-            parts.append(f"{reading}: no precision will do for {name}, since the roll error alone costs {shift}")
+            unit = unit_of(requirement)
+            shift = requirement[reading][f"roll_shift_{unit}"]
+            why = "tell no pose" if shift is None else f"are off by {amount(shift, unit, '.3g')}"
+            parts.append(f"{reading}: no precision will do for {name}, since with the roll error perfect lines {why}")
+        elif not requirement[reading]["first_order_holds"]:
+            text = f"{reading}: {name} decides, with {needed:.3g} px, which drawing does not bear out"
+            parts.append(f"{text}: whether {there:.3g} px is enough is open")
         else:
             enough = "is enough" if there <= needed else "is not enough"
             parts.append(f"{reading}: {name} decides, with {needed:.3g} px; {there:.3g} px {enough}")

@@ -112,7 +112,7 @@ def _head(figure: Figure, budget: Mapping[str, Any], height: float) -> None:
         setting_text(budget),
         (
             "To first order, with one thing changed in each row. Where a curve ends, a line is out of the image,"
-            " or no precision keeps the bound"
+            " or no precision keeps the bound" + _doubt(budget)
         ),
     )
     for text, below, font, colour in zip(
@@ -120,6 +120,13 @@ def _head(figure: Figure, budget: Mapping[str, Any], height: float) -> None:
     ):
         room = 72.0 * 0.975 * WIDTH / (0.53 * max(len(text), 1))  # a letter is about half as wide as its size
         figure.text(0.012, 1.0 - below / height, text, va="top", fontsize=min(font, room), color=colour)
+
+
+def _doubt(budget: Mapping[str, Any]) -> str:
+    """What a hollow mark says, if there is one."""
+    of = [requirement[reading] for requirement in budget["requirements"] for reading in READINGS]
+    doubtful = any(one.get("first_order_holds") is False for one in of)
+    return ". Hollow: first order is off by over 10 %" if doubtful else ""
 
 
 def _width(i: int) -> float:
@@ -143,8 +150,10 @@ def _panel(
         axes.plot(values, row, lw=_width(i), zorder=3.0, ms=3.2, mew=0.0, markevery=places, **CURVES[i % len(CURVES)])
         present = sweep["present"][requirement["stage"]]
         now = _drawn([requirement[reading]["needed_noise_px"]])
+        colour, doubtful = CURVES[i % len(CURVES)]["color"], requirement[reading]["first_order_holds"] is False
         axes.plot([present], now, ls="none", marker=CURVES[i % len(CURVES)]["marker"], ms=4.5, zorder=4.0,
-                  color=CURVES[i % len(CURVES)]["color"], mec="white", mew=0.5)  # fmt: skip
+                  mfc="white" if doubtful else colour, mec=colour if doubtful else "white",
+                  mew=1.0 if doubtful else 0.5)  # fmt: skip
     if there > 0.0:
         axes.axhline(there, zorder=1.5, **THERE)
     axes.set_xlim(float(values[0]), float(values[-1]))

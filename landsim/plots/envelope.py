@@ -25,10 +25,21 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from estimator.so3 import Array
 from landsim.plots.printed import COLUMN, PAGE, PRINTED, save
 from landsim.plots.style import BLACK, BLUE, GREEN, VERMILION, number
-from landsim.study.model import LEVELS, OF_STAGE, QUANTITIES, READINGS, Envelope, StageName
+from landsim.study.model import (
+    JUDGED,
+    LEVEL,
+    LEVELS,
+    NORMAL,
+    OF_STAGE,
+    QUANTITIES,
+    READINGS,
+    Envelope,
+    StageName,
+    enough,
+)
 from landsim.units import DEG
 
-NORMAL_95 = 1.96
+SIGMAS = NORMAL[JUDGED]
 """So many σ hold 95 % of a normal distribution, either side."""
 BANDS = ("#bdbdbd", "#d6d6d6", "#ececec")
 """Of the percentiles `LEVELS`, the more probable the darker."""
@@ -164,8 +175,8 @@ def _panel(axes: Axes, envelopes: Sequence[Envelope], name: str, bound: float | 
         _vision(axes, one, name)
     for one, dashes in zip(vision[1:], cycle(ROLL_DASHES), strict=False):
         distance, spread, _, _ = _shown(one, name)
-        label = f"vision, 95 %, roll off by {number(one.roll_error / DEG, '.3g')}°"
-        axes.plot(distance, spread[:, 1], **ROLL_OFF, ls=dashes, label=label)
+        label = f"vision, {LEVEL:g} %, roll off by {number(one.roll_error / DEG, '.3g')}°"
+        axes.plot(distance, spread[:, JUDGED], **ROLL_OFF, ls=dashes, label=label)
     for one in (one for one in envelopes if one.source == "fused"):
         _fused(axes, one, name)
     if bound is not None:
@@ -173,9 +184,14 @@ def _panel(axes: Axes, envelopes: Sequence[Envelope], name: str, bound: float | 
 
 
 def _shown(one: Envelope, name: str) -> tuple[Array, Array, Array, Array]:
-    """Distances (n,), percentiles (n, 3), σ (n,) and single error (n,) of a quantity, in its unit, as magnitudes."""
+    """Distances (n,), percentiles (n, 3), σ (n,) and single error (n,) of a quantity, in its unit, as magnitudes.
+
+    A percentile of too few errors is NaN.
+    """
     k, scale = one.quantities.index(name), QUANTITIES[name].scale
-    return one.distance, one.percentiles[:, k] / scale, one.sigma[:, k] / scale, np.abs(one.single[:, k]) / scale
+    there = np.stack([enough(one.count, level) for level in LEVELS], axis=-1)
+    spread = np.where(there, one.percentiles[:, k], np.nan)
+    return one.distance, spread / scale, one.sigma[:, k] / scale, np.abs(one.single[:, k]) / scale
 
 
 def _vision(axes: Axes, one: Envelope, name: str) -> None:
@@ -183,12 +199,14 @@ def _vision(axes: Axes, one: Envelope, name: str) -> None:
     low = np.full(distance.size, LEAST)
     for i, (level, colour) in enumerate(zip(LEVELS, BANDS, strict=True)):
         high = np.minimum(spread[:, i], MOST)  # infinite where there was no solution
+        if not enough(one.count, level).any():
+            continue
         axes.fill_between(distance, low, high, color=colour, lw=0.0, zorder=0.5, label=_band_label(one, level))
         low = high
     size = 2.0 if distance.size > 300 else 3.5
     axes.plot(distance, single, **VISION, ms=size, label="vision, one realisation")
     if np.isfinite(sigma).any():
-        axes.plot(distance, NORMAL_95 * sigma, **FIRST_ORDER, label=f"Cramér–Rao bound, {NORMAL_95:g} σ")
+        axes.plot(distance, SIGMAS * sigma, **FIRST_ORDER, label=f"Cramér–Rao bound, {SIGMAS:.3g} σ")
 
 
 def _band_label(one: Envelope, level: float) -> str:
@@ -198,8 +216,10 @@ def _band_label(one: Envelope, level: float) -> str:
 def _fused(axes: Axes, one: Envelope, name: str) -> None:
     distance, spread, sigma, single = _shown(one, name)
     axes.plot(distance, single, **FUSED_SINGLE, label="fused, one flight")
-    axes.plot(distance, spread[:, 1], **FUSED, label=f"fused, 95 % of n = {int(one.count.max())}")
-    axes.plot(distance, NORMAL_95 * sigma, **FUSED_SIGMA, label=f"fused, {NORMAL_95:g} σ of the filter")
+    if enough(one.count, LEVEL).any():
+        label = f"fused, {LEVEL:g} % of n = {int(one.count.max())}"
+        axes.plot(distance, spread[:, JUDGED], **FUSED, label=label)
+    axes.plot(distance, SIGMAS * sigma, **FUSED_SIGMA, label=f"fused, {SIGMAS:.3g} σ of the filter")
 
 
 def _limits(envelopes: Sequence[Envelope], name: str, bound: float | None) -> tuple[float, float]:
@@ -207,7 +227,7 @@ def _limits(envelopes: Sequence[Envelope], name: str, bound: float | None) -> tu
     values = [np.empty(0) if bound is None else np.array([bound / QUANTITIES[name].scale])]
     for one in envelopes:
         _, spread, sigma, _ = _shown(one, name)
-        values += [spread[:, 0 if one.source == "vision" else 1], spread[:, 2], NORMAL_95 * sigma]
+        values += [spread[:, 0 if one.source == "vision" else JUDGED], spread[:, 2], SIGMAS * sigma]
     every = np.concatenate(values)
     every = every[np.isfinite(every) & (every > 0.0)]
     if not every.size:

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from landsim.config import Scenario, StudyConfig
+from landsim.state import Stage
 from landsim.study.envelope import percentiles
-from landsim.study.geometry import LEVEL, Proportion, RollLimit, lateral_shift
+from landsim.study.geometry import Proportion, RollLimit, lateral_shift
 from landsim.study.judged import SAME_PLACE, bounds_of, plain, rows_at
-from landsim.study.model import LEVELS, QUANTITIES, Envelope
+from landsim.study.model import LEVEL, LEVELS, QUANTITIES, Envelope
 from landsim.units import DEG
 
 TIED = (("cross", "yaw"), ("altitude", "pitch"))
@@ -27,16 +28,21 @@ def roll_entries(limits: Sequence[RollLimit]) -> list[dict[str, Any]]:
             "bound": limit.bound / QUANTITIES[limit.quantity].scale,
             "roll_error_deg": None if limit.roll_error is None else limit.roll_error / DEG,
             "holds_beyond": limit.beyond,
+            "limited_by": None if limit.beyond else "no solution" if limit.no_solution else "bound",
             "at_range_m": limit.distance,
             "at_height_m": limit.height,
             "p95_over_bound": plain(limit.ratio),
             "draws": limit.draws,
+            "checked_at_m": list(limit.checked),
+            "confirmed": limit.confirmed,
         }
         for limit in limits
     ]
 
 
-def shift_entries(scenario: Scenario, late: Iterable[tuple[float, float, float, float]]) -> list[dict[str, float]]:
+def shift_entries(
+    scenario: Scenario, late: Iterable[tuple[float, float, float, float]]
+) -> list[dict[str, float | None]]:
     """What a roll error does to the cross estimate, by the formula and by the solver.
 
     Parameters
@@ -44,7 +50,8 @@ def shift_entries(scenario: Scenario, late: Iterable[tuple[float, float, float, 
     scenario : Scenario
         A study.
     late : iterable of (float, float, float, float)
-        Distance, height, roll error (rad) and the shift (m) of the cross estimate from lines without noise.
+        Distance, height, roll error (rad) and the shift (m) of the cross estimate from lines without noise; NaN, and
+        None in the result, where they have no solution.
     """
     return [
         {
@@ -52,7 +59,7 @@ def shift_entries(scenario: Scenario, late: Iterable[tuple[float, float, float, 
             "height_m": height,
             "roll_error_deg": roll_error / DEG,
             "formula_m": float(lateral_shift(height, scenario.runway.width_m, roll_error)),
-            "measured_m": shift,
+            "measured_m": plain(shift),
         }
         for distance, height, roll_error, shift in late
     ]
@@ -119,13 +126,21 @@ def proportion_entries(found: Sequence[Proportion]) -> list[dict[str, Any]]:
             "altitude_over_range_times_pitch": plain(p.altitude_over_pitch),
             "cross_yaw_correlation": plain(p.cross_yaw_correlation),
             "altitude_pitch_correlation": plain(p.altitude_pitch_correlation),
+            "cross_roll_correlation": plain(p.cross_roll_correlation),
+            "yaw_roll_correlation": plain(p.yaw_roll_correlation),
+            "sight_line_down_deg": plain(p.sight / DEG),
+            "optical_axis_down_deg": plain(p.axis / DEG),
         }
         for p in found
     ]
 
 
 def flights_entry(
-    rows: Sequence[Mapping[str, Any]], envelopes: Sequence[Envelope], ranges: Sequence[float], seed: int
+    rows: Sequence[Mapping[str, Any]],
+    envelopes: Sequence[Envelope],
+    ranges: Sequence[float],
+    seed: int,
+    lowest: float = 0.0,
 ) -> dict[str, Any]:
     """Where the fused errors come from: how many flights, how they ended, and from where on the filter runs.
 
@@ -139,6 +154,8 @@ def flights_entry(
         At which the filter's own roll error in the late stage is told, m.
     seed : int
         Of the first flight.
+    lowest : float
+        Height of the camera at which the late stage ends, m.
 
     Returns
     -------
@@ -158,7 +175,7 @@ def flights_entry(
             "last_seed": seed + len(flown) - 1,
             "outcomes": {outcome: outcomes.count(outcome) for outcome in sorted(set(outcomes))},
             **{key: _first_with(fused.get("early"), number) for key, number in begin.items()},
-            "late_roll": _late_roll(flown, fused.get("late"), ranges),
+            "late_roll": _late_roll(flown, fused.get("late"), ranges, lowest),
         }
     return result
 
@@ -170,13 +187,13 @@ def _first_with(envelope: Envelope | None, number: int) -> float | None:
 
 
 def _late_roll(
-    flown: Sequence[Mapping[str, Any]], late: Envelope | None, ranges: Sequence[float]
+    flown: Sequence[Mapping[str, Any]], late: Envelope | None, ranges: Sequence[float], lowest: float
 ) -> list[dict[str, Any]]:
-    """95th percentile of the filter's roll error at the listed ranges of the late stage."""
+    """95th percentile of the filter's roll error at the listed ranges, over the flights in the late stage there."""
     result = []
     for i in [] if late is None else rows_at(late, ranges):
         distance = float(late.distance[i]) if late is not None else math.nan
-        errors = [_at(row, "fused_error_roll_deg", distance) for row in flown]
+        errors = [_late_error(row, "fused_error_roll_deg", distance, lowest) for row in flown]
         known = np.array([error for error in errors if math.isfinite(error)])
         if known.size:
             p95 = float(percentiles(known[:, None], (LEVEL,))[0, 0])
@@ -184,6 +201,11 @@ def _late_roll(
     return result
 
 
-def _at(row: Mapping[str, Any], name: str, distance: float) -> float:
+def _late_error(row: Mapping[str, Any], name: str, distance: float, lowest: float) -> float:
+    """Of one flight; NaN where it is not in the late stage, as `landsim.study.flights.envelopes` has it."""
     near = np.flatnonzero(np.abs(np.asarray(row["distance_m"]) - distance) <= SAME_PLACE)
-    return float(row[name][near[0]]) if near.size else math.nan
+    if not near.size:
+        return math.nan
+    i, touchdown = near[0], row["touchdown_time_s"]
+    airborne = (touchdown is None or row["time_s"][i] < touchdown) and row["true_height_m"][i] >= lowest
+    return float(row[name][i]) if airborne and row["stage"][i] == Stage.LATE else math.nan

@@ -4,8 +4,9 @@ What a straight path by sampling cannot show is here: attitude motion, the roll 
 and what the inertial unit makes of it all.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -22,7 +23,17 @@ from landsim.study.frames import Frames, look
 from landsim.study.model import OF_STAGE, QUANTITIES, SOURCES, Envelope, Reading, Source, StageName
 from landsim.units import DEG
 
-__all__ = ["as_flight", "attitude_errors", "envelopes", "fly_study", "load_rows", "of_reading", "save_rows"]
+__all__ = [
+    "FlownErrors",
+    "as_flight",
+    "attitude_errors",
+    "envelopes",
+    "flown_errors",
+    "fly_study",
+    "load_rows",
+    "of_reading",
+    "save_rows",
+]
 
 STAGES: dict[StageName, Stage] = {"early": Stage.EARLY, "late": Stage.LATE}
 ATTITUDE = ("roll", "pitch", "yaw")
@@ -90,6 +101,58 @@ def envelopes(scenario: Scenario, rows: Sequence[Row], reading: Reading) -> tupl
         If there is no row of the reading, or the rows' distances differ.
     """
     flown = of_reading(rows, reading)
+    result = []
+    for stage, inside, ranges in _stages(scenario, flown, reading):
+        bounds = {
+            "vision": _first_order(scenario, flown, stage, reading, inside, ranges),
+            "fused": _own_sigma(flown, stage, inside, ranges),
+        }
+        result += [_envelope(flown, stage, reading, source, inside, ranges, bounds[source]) for source in SOURCES]
+    return tuple(result)
+
+
+@dataclass(frozen=True)
+class FlownErrors:
+    """What each flight has to do with an envelope; f flights, n distances, k quantities.
+
+    Attributes
+    ----------
+    stage : {"early", "late"}
+    reading : {"endpoints", "edge-points"}
+    source : {"vision", "fused"}
+    distance : (n,) array
+        That of the envelope, m.
+    size : (f, n, k) array
+        Magnitude of the error, m and rad; infinite without a solution, NaN where the flight does not count.
+    reached : (n,) int array
+        Flights that are in the stage there, with a solution or without.
+    """
+
+    stage: StageName
+    reading: Reading
+    source: Source
+    distance: Array
+    size: Array
+    reached: NDArray[np.int_]
+
+
+def flown_errors(scenario: Scenario, rows: Sequence[Row], reading: Reading) -> tuple[FlownErrors, ...]:
+    """The errors behind each of `envelopes`, in its order; parameters and exceptions are the same."""
+    flown = of_reading(rows, reading)
+    result = []
+    for stage, inside, ranges in _stages(scenario, flown, reading):
+        for source in SOURCES:
+            errors = _errors(flown, stage, source)
+            counted = _counted(errors, source, inside)
+            size = np.where(np.isnan(errors), np.inf, np.abs(errors))
+            size = np.where(counted[..., None], size, np.nan)[:, ranges]
+            distance = np.asarray(flown[0]["distance_m"], dtype=float)[ranges]
+            result.append(FlownErrors(stage, reading, source, distance, size, inside.sum(axis=0)[ranges]))
+    return tuple(result)
+
+
+def _stages(scenario: Scenario, flown: Sequence[Row], reading: Reading) -> Iterator[tuple[StageName, Inside, Ranges]]:
+    """The stages that have ranges, with which flights are in them where."""
     if not flown:
         raise ValueError(f"no flight with {reading}")
     distance = np.asarray(flown[0]["distance_m"], dtype=float)
@@ -99,17 +162,11 @@ def envelopes(scenario: Scenario, rows: Sequence[Row], reading: Reading) -> tupl
     height = _stack(flown, "true_height_m")
     touchdown = np.array([np.inf if row["touchdown_time_s"] is None else row["touchdown_time_s"] for row in flown])
     airborne = (_stack(flown, "time_s") < touchdown[:, None]) & (height >= lowest)
-    result = []
     for stage, number in STAGES.items():
         inside = airborne & (_stack(flown, "stage") == number)
         ranges = np.flatnonzero(inside.mean(axis=0) >= SHARE)
         if ranges.size:
-            bounds = {
-                "vision": _first_order(scenario, flown, stage, reading, inside, ranges),
-                "fused": _own_sigma(flown, stage, inside, ranges),
-            }
-            result += [_envelope(flown, stage, reading, source, inside, ranges, bounds[source]) for source in SOURCES]
-    return tuple(result)
+            yield stage, inside, ranges
 
 
 def attitude_errors(rows: Sequence[Row], distance: float, source: Source = "fused") -> Array:
@@ -135,6 +192,19 @@ def _stack(rows: Sequence[Row], name: str) -> Array:
     return np.array([row[name] for row in rows], dtype=float)
 
 
+def _errors(rows: Sequence[Row], stage: StageName, source: Source) -> Array:
+    """Of every flight at every distance, (flights, distances, k), SI."""
+    return np.stack(
+        [_stack(rows, f"{source}_error_{QUANTITIES[q].column}") * QUANTITIES[q].scale for q in OF_STAGE[stage]],
+        axis=-1,
+    )
+
+
+def _counted(errors: Array, source: Source, inside: Inside) -> Inside:
+    """Which flights count where: a filter has to run, a frame without a solution is one all the same."""
+    return inside if source == "vision" else inside & np.isfinite(errors).all(axis=-1)
+
+
 def _envelope(
     rows: Sequence[Row],
     stage: StageName,
@@ -146,10 +216,8 @@ def _envelope(
 ) -> Envelope:
     """One envelope."""
     names = OF_STAGE[stage]
-    errors = np.stack(
-        [_stack(rows, f"{source}_error_{QUANTITIES[q].column}") * QUANTITIES[q].scale for q in names], axis=-1
-    )
-    counted: Inside = inside if source == "vision" else inside & np.isfinite(errors).all(axis=-1)
+    errors = _errors(rows, stage, source)
+    counted = _counted(errors, source, inside)
     spread = [percentiles(errors[counted[:, i], i]) for i in ranges]
     return Envelope(
         stage=stage,

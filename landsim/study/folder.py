@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from landsim.config import Scenario, load_scenario, resolved_toml
 from landsim.errors import RunFolderError, is_text, one_line, what_is_wrong
 from landsim.parquet import read_table, write_table
-from landsim.study.model import QUANTITIES, Envelope
+from landsim.study.model import OF_STAGE, QUANTITIES, READINGS, SOURCES, Envelope
 from landsim.units import DEG
 
 SCENARIO_FILE = "scenario.toml"
@@ -29,15 +29,38 @@ COLUMNS = ("listed", *WORDS, *NUMBERS)
 """Of envelopes.parquet: a row for each quantity of each range of each envelope, in the quantity's own ``unit``."""
 
 
-class _Needed(BaseModel):
-    """What is read of verdict.json; there is more in it."""
+class _Part(BaseModel):
+    """What is read of a part of verdict.json; there is more in it."""
 
     model_config = ConfigDict(strict=True)
 
+
+class _Curves(_Part):
+    p95: list[list[float | None]]
+
+
+class _TiltStage(_Part):
+    range_m: list[float]
+    height_m: list[float]
+    endpoints: dict[str, _Curves]
+    edge_points: Annotated[dict[str, _Curves], Field(alias="edge-points")]
+
+
+class _Tilt(_Part):
+    pitch_down_deg: Annotated[list[float], Field(min_length=2)]
+    early: _TiltStage
+    late: _TiltStage
+
+
+class _Claims(_Part):
+    tilt: _Tilt | None = None
+
+
+class _Needed(_Part):
     scenario: str
     seed: Annotated[int, Field(ge=0)]
     entries: list[dict[str, Any]]
-    claims: dict[str, Any]
+    claims: _Claims
 
 
 class Study(NamedTuple):
@@ -182,6 +205,15 @@ def _append(columns: dict[str, list[Any]], envelope: Envelope, k: int, name: str
         columns[key] += values.tolist()
 
 
+_KNOWN: dict[str, tuple[str, ...]] = {
+    "stage": tuple(OF_STAGE),
+    "reading": READINGS,
+    "source": SOURCES,
+    "quantity": tuple(QUANTITIES),
+}
+"""The words that the columns may hold."""
+
+
 def load_envelopes(path: Path, *, listed: bool) -> tuple[Envelope, ...]:
     """Read envelopes back: those by frame, or the listed ones.
 
@@ -197,6 +229,15 @@ def load_envelopes(path: Path, *, listed: bool) -> tuple[Envelope, ...]:
     try:
         columns = {name: np.asarray(table[name].to_pylist()) for name in ("listed", *WORDS)}
         columns |= {name: table[name].to_numpy().astype(float) for name in NUMBERS}
+        for name, known in _KNOWN.items():
+            unknown = sorted(set(columns[name].tolist()) - set(known), key=str)
+            if unknown:
+                raise ValueError(f"{name} holds {unknown[0]!r}; known: {', '.join(known)}")
+        for name in ("distance_m", "time_s", "count"):
+            if not np.isfinite(columns[name]).all():
+                raise ValueError(f"{name} has gaps")
+        if not columns["listed"].size:
+            raise ValueError("it has no rows")
         return _envelopes(columns, listed=listed)
     except (ValueError, TypeError, KeyError) as error:
         raise RunFolderError(f"{path}: is not a table of envelopes: {error}") from None

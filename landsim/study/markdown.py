@@ -4,12 +4,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from landsim.errors import one_line
+from landsim.study.judged import KEYS, LEAVES, allowed
+from landsim.study.model import CHANCE, LEVEL, LEVELS
 from landsim.study.paragraphs import figure, with_unit
 from landsim.study.words import listed as in_words
 
 Verdict = Mapping[str, Any]
 Entry = Mapping[str, Any]
-STATISTICS = (("p68", "68.27 %"), ("p95", "95 %"), ("p99_7", "99.73 %"), ("sigma", "σ"))
+STATISTICS = (*((key, f"{level:g} %") for key, level in zip(KEYS, LEVELS, strict=True)), ("sigma", "σ"))
 UNITS = {"deg": "°", "m": "m"}
 
 
@@ -34,10 +36,33 @@ def said(entry: Entry) -> str:
     if entry["bound"] is None:
         return "no bound"
     if entry["judged_from_m"] is None:
-        return "no data"
+        return "not in every flight" if any(row["count"] for row in entry["listed"]) else "no data"
+    if entry["holds"] is None:
+        return f"too few {drawn(entry)}"
     if entry["holds"]:
         return "holds"
     return "does not hold" if entry["holds_from_m"] is None else f"from {entry['holds_from_m']:.0f} m"
+
+
+def drawn(entry: Entry) -> str:
+    """What an entry's errors are of."""
+    return "flights" if entry["of_flights"] else "draws"
+
+
+def cell(row: Mapping[str, Any], key: str) -> str:
+    """A statistic at a listed range: a figure, or that it has no limit, or a dash where there is none."""
+    if key in row["no_limit"]:
+        return "no limit"
+    return "–" if row[key] is None else figure(row[key])
+
+
+def _with_interval(entry: Entry) -> str:
+    """What is said of an entry, and between where and where its range is."""
+    interval = entry["holds_from_interval_m"]
+    if interval is None:
+        return said(entry)
+    low, high = ("not at the end" if end is None else f"{end:.0f}" for end in interval)
+    return f"{said(entry)} ({low} m)" if low == high else f"{said(entry)} ({low} to {high} m)"
 
 
 def needed(entry: Entry) -> str:
@@ -60,12 +85,12 @@ def _page(verdict: Verdict) -> Iterator[str]:
     yield ""
     yield (
         f"A bound holds if {figure(verdict['judged_at_percent'])} % of the errors keep it from the stage's first range"
-        " on: early from the first listed range, late from the hand-over; the fused solution from where it begins."
-        " Otherwise the range is named from which it does."
+        " on: early from the first listed range, late from the hand-over; the fused solution from where it runs in"
+        " every flight that comes there. Otherwise the range is named from which it does." + _of_flights(verdict)
     )
     yield ""
     yield from _table(
-        ("stage", "source", "reading", "quantity", "bound", "at 95 %", "line precision to hold throughout"),
+        ("stage", "source", "reading", "quantity", "bound", f"at {LEVEL:g} %", "line precision to hold throughout"),
         [
             (
                 e["stage"] + (f", roll off by {figure(e['roll_error_deg'])}°" if e["roll_error_deg"] else ""),
@@ -73,7 +98,7 @@ def _page(verdict: Verdict) -> Iterator[str]:
                 e["reading"],
                 e["quantity"],
                 with_unit(e["bound"], e["unit"]),
-                said(e),
+                _with_interval(e),
                 needed(e),
             )
             for e in verdict["entries"]
@@ -121,10 +146,10 @@ def _figures(entries: Sequence[Entry]) -> Iterator[str]:
     rows = []
     for e in entries:
         for key, name in STATISTICS:
-            cells = ["–" if row[key] is None else figure(row[key]) for row in e["listed"]]
+            cells = [cell(row, key) for row in e["listed"]]
             rows.append((f"{e['quantity']}, {UNITS[e['unit']]}", name, *cells))
     counts = (
-        "draws" if entries[0]["source"] == "vision" else "flights",
+        drawn(entries[0]),
         "",
         *(str(row["count"]) for row in entries[0]["listed"]),
     )
@@ -144,15 +169,42 @@ def _tails(verdict: Verdict) -> str:
                 each = [f"{q} at {in_words([figure(r) for r in ranges])} m" for q, ranges in left.items()]
                 words.append(f"at {level} {in_words(each)}")
         ratios = [row["p68_over_first_order"] for e in entries for row in e["listed"] if row["p68_over_first_order"]]
-        span = f" (68.27 %: {min(ratios):.3f} to {max(ratios):.3f} times it)" if ratios else ""
-        parts.append(
-            f"{name}: " + (f"leaves it {'; '.join(words)}" if words else "within 5 % of it everywhere") + f"{span}."
-        )
+        span = f" ({STATISTICS[0][1]}: {min(ratios):.3f} to {max(ratios):.3f} times it)" if ratios else ""
+        parts.append(f"{name}: " + (f"leaves it {'; '.join(words)}" if words else _close(entries)) + f"{span}.")
     head = "σ is what the first order (Cramér-Rao) predicts for vision, and the filter's own for what is fused."
     if not parts:
         return head
-    return f"{head} Where a percentile is more than 5 % off first order: " + " ".join(
-        f"{part[0].upper()}{part[1:]}" for part in parts
+    how = (
+        f"A percentile leaves the first order where it is off by more than {figure(100.0 * LEAVES)} % and by more than"
+        f" {figure(CHANCE)} standard errors, which is what chance explains."
+    )
+    return f"{head} {how} " + " ".join(f"{part[0].upper()}{part[1:]}" for part in parts)
+
+
+def _close(entries: Sequence[Entry]) -> str:
+    """That no percentile leaves the first order, as far as so many errors can tell."""
+    counts = sorted({row["count"] for e in entries for row in e["listed"] if row["count"]})
+    there = [
+        (level, key, allowed(level, counts[0]))
+        for level, (key, _) in zip(LEVELS, STATISTICS, strict=False)
+        if any(row[key] is not None for e in entries for row in e["listed"])
+    ]
+    if not there:
+        return f"too few {drawn(entries[0])} to compare"
+    if max(most for _, _, most in there) <= LEAVES:
+        return f"within {figure(100.0 * LEAVES)} % of it everywhere"
+    number = "–".join(map(str, dict.fromkeys((counts[0], counts[-1]))))
+    off = ", ".join(f"{figure(100.0 * most)} % at {level:g} %" for level, _, most in there)
+    return f"off it by no more than chance explains with n = {number} (by up to {off})"
+
+
+def _of_flights(verdict: Verdict) -> str:
+    """How well so many flights fix a range."""
+    if all(e["holds_from_interval_m"] is None for e in verdict["entries"]):
+        return ""
+    return (
+        f" In brackets, where the errors are those of flights: the interval in which that range is at {LEVEL:g} %, by"
+        " drawing anew from the flights."
     )
 
 
@@ -184,12 +236,20 @@ def _precisions(verdict: Verdict) -> Iterator[str]:
                 points,
                 f"{figure(p['at_range_m'])} m",
                 "–" if p["p95"] is None else with_unit(p["p95"], e["unit"]),
-                f"{p['draws']}: " + ("yes" if p["confirmed"] else "not drawn" if not p["draws"] else "no"),
+                _confirmed(p),
             )
         )
     heads = ("stage", "reading", "quantity", "bound", "σ of a point", "spacing", "points", "tightest at",
-             "sampled 95 %", "draws: confirmed")  # fmt: skip
+             f"sampled {LEVEL:g} %", "draws: confirmed, part within the bound")  # fmt: skip
     yield from _table(heads, rows)
+
+
+def _confirmed(precision: Mapping[str, Any]) -> str:
+    """Whether draws bear it out, and in which interval the part is that keeps the bound."""
+    if not precision["draws"]:
+        return "0: not drawn"
+    low, high = precision["within_interval_percent"]
+    return f"{precision['draws']}: {'yes' if precision['confirmed'] else 'no'}, {low:.1f} to {high:.1f} %"
 
 
 def _rolls(verdict: Verdict) -> Iterator[str]:
@@ -205,14 +265,16 @@ def _rolls(verdict: Verdict) -> Iterator[str]:
             x["quantity"],
             with_unit(x["bound"], x["unit"]),
             "does not hold with the true roll" if x["roll_error_deg"] is None else
-            f"{'more than ' if x['holds_beyond'] else ''}{with_unit(x['roll_error_deg'], 'deg')}",
+            f"{'more than ' if x['holds_beyond'] else ''}{with_unit(x['roll_error_deg'], 'deg')}"
+            f"{', beyond it no solution' if x.get('limited_by') == 'no solution' else ''}",
             f"{figure(x['at_range_m'])} m, {figure(x['at_height_m'])} m up",
             "–" if x["p95_over_bound"] is None else figure(x["p95_over_bound"]),
             str(x["draws"]),
         )
         for x in limits
     ]  # fmt: skip
-    heads = ("reading", "quantity", "bound", "roll error", "decided at", "sampled 95 % over bound there", "draws")
+    over = f"sampled {LEVEL:g} % over bound there"
+    heads = ("reading", "quantity", "bound", "roll error", "decided at", over, "draws")
     yield from _table(heads, rows)
 
 

@@ -3,8 +3,13 @@
 SI and radians inside; a quantity knows how it is shown.
 """
 
+import math
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from estimator.so3 import Array
 from landsim.units import DEG
@@ -17,6 +22,26 @@ READINGS: tuple[Reading, ...] = ("endpoints", "edge-points")
 SOURCES: tuple[Source, ...] = ("vision", "fused")
 LEVELS = (68.27, 95.0, 99.73)
 """Percentiles of the absolute error that are kept, %."""
+LEVEL = 95.0
+"""The one of them at which a bound has to hold, %."""
+JUDGED = LEVELS.index(LEVEL)
+NORMAL = tuple(NormalDist().inv_cdf(0.5 + 0.005 * level) for level in LEVELS)
+"""The same percentiles of a standard normal's magnitude: Φ⁻¹((1 + p)/2)."""
+CHANCE = 3.0
+"""So many standard errors of a sampled percentile, or share, pass for chance."""
+
+
+def enough(count: ArrayLike, level: float) -> NDArray[np.bool_]:
+    """Whether so many errors have a percentile of a level (%): with fewer it would be the largest of them."""
+    return np.asarray(np.asarray(count) * (1.0 - level / 100.0) >= 1.0 - 1e-9)
+
+
+def chance(count: ArrayLike, level: float) -> Array:
+    """Relative standard error √(p (1 - p)/n) / (2 φ(z) z) of the percentile p of n normal errors' magnitudes."""
+    p, z = level / 100.0, NormalDist().inv_cdf(0.5 + 0.005 * level)
+    with np.errstate(divide="ignore"):
+        spread = np.sqrt(p * (1.0 - p) / np.asarray(count, float))
+    return np.asarray(spread / (2.0 * math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi) * z))
 
 
 class Quantity(NamedTuple):

@@ -3,10 +3,12 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from landsim.study.model import OF_STAGE, READINGS
+from landsim.study.model import LEVEL, LEVELS, OF_STAGE, READINGS
 from landsim.study.verdict import find
 from landsim.study.words import listed
 
+AT = f"{LEVEL:g} %"
+"""The level at which a bound has to hold, as it is written."""
 UNITS = {"deg": "°", "m": " m"}
 Verdict = Mapping[str, Any]
 Entry = Mapping[str, Any]
@@ -47,7 +49,7 @@ def closest(verdict: Verdict, stage: str) -> str:
     """Which noise reading comes closest to the bounds of a stage, and where."""
     judged: dict[str, list[Entry]] = {}
     for reading in READINGS:
-        entries = [e for e in find(verdict, stage, reading) if e["bound"] is not None]
+        entries = [e for e in find(verdict, stage, reading) if e["holds"] is not None]
         if entries and entries[0]["judged_from_m"] is not None:
             judged[reading] = entries
     if not judged:
@@ -60,8 +62,8 @@ def closest(verdict: Verdict, stage: str) -> str:
     for name in order:
         entries = judged[name]
         parts.append(_span(name, entries))
-        parts.append(_reach(name, entries, stage, "holds_from_m", "At 95 %"))
-        parts.append(_reach(name, entries, stage, "holds_from_m_at_68", "At 68.27 %"))
+        parts.append(_reach(name, entries, stage, "holds_from_m", f"At {AT}"))
+        parts.append(_reach(name, entries, stage, "holds_from_m_at_68", f"At {LEVELS[0]:g} %"))
     if not any(all(e["holds"] for e in entries) for entries in judged.values()):
         parts.append(f"With the noise as stated no reading meets all bounds from {figure(begin)} m on.")
     parts.append(_needed(judged))
@@ -105,8 +107,8 @@ def _span(reading: str, entries: Sequence[Entry]) -> str:
     best, worst = min(ratios, key=lambda pair: pair[1]), max(ratios, key=lambda pair: pair[1])
     place = next(row["range_m"] for row in worst[0]["listed"] if row["count"] > 0)
     return (
-        f"At {figure(place)} m the 95th percentile is {figure(best[1])} ({best[0]['quantity']}) to {figure(worst[1])}"
-        f" ({worst[0]['quantity']}) times the bound with `{reading}`."
+        f"At {figure(place)} m the {LEVEL:g}th percentile is {figure(best[1])} ({best[0]['quantity']}) to"
+        f" {figure(worst[1])} ({worst[0]['quantity']}) times the bound with `{reading}`."
     )
 
 
@@ -139,8 +141,8 @@ def meeting(verdict: Verdict) -> str:
     parts = []
     for m in found:
         parts.append(
-            f"{m['angle'].capitalize()} and {m['position']}: an error of the {m['angle']} turns the runway about the"
-            f" camera and moves the {m['position']} estimate by range times angle, so that bounds of"
+            f"{m['angle'].capitalize()} and {m['position']}: an error of the {m['angle']} alone turns the runway about"
+            f" the camera and moves the {m['position']} estimate by range times angle, so that bounds of"
             f" {with_unit(m['angle_bound_deg'], 'deg')} and {with_unit(m['position_bound_m'], 'm')} ask the same at"
             f" {figure(m['position_bound_m'])} m / {with_unit(m['angle_bound_deg'], 'deg')} ="
             f" {figure(m['range_m'])} m. At {figure(m['first_range_m'])} m the {m['position']} bound alone asks for"
@@ -152,7 +154,7 @@ def meeting(verdict: Verdict) -> str:
             if one["range_m"] is not None
         ]
         if tight:
-            parts.append(f"By the 95th percentiles both are equally tight at {listed(tight)}.")
+            parts.append(f"By the {LEVEL:g}th percentiles both are equally tight at {listed(tight)}.")
     parts.append(_borne_out(verdict["proportions"]))
     return " ".join(part for part in parts if part)
 
@@ -168,18 +170,39 @@ def _borne_out(rows: Sequence[Mapping[str, Any]]) -> str:
         far, near = max(known, key=lambda row: row["range_m"]), min(known, key=lambda row: row["range_m"])
         low, high = min(row[ratio] for row in known), max(row[ratio] for row in known)
         parts.append(
-            f"As drawn, {position} over {angle} is {figure(low)} to {figure(high)} times the range; the {angle} error"
-            f" explains {figure(100.0 * far[tied] ** 2)} % of the {position} error's variance at"
-            f" {figure(far['range_m'])} m and {figure(100.0 * near[tied] ** 2)} % at {figure(near['range_m'])} m."
+            f"As drawn, {position} over {angle} is {figure(low)} to {figure(high)} times the range in either reading;"
+            f" with `{far['reading']}` the {angle} error explains {_share(far[tied])} of the {position} error's"
+            f" variance at {figure(far['range_m'])} m and {_share(near[tied])} at {figure(near['range_m'])} m."
         )
-    if parts:
-        parts.append("The rest is the bearing of the threshold itself, and the other angles.")
-    return " ".join(parts)
+    parts.append(_roll_in_it(rows))
+    return " ".join(part for part in parts if part)
+
+
+def _share(correlation: float) -> str:
+    return f"{figure(100.0 * correlation**2)} %"
+
+
+def _roll_in_it(rows: Sequence[Mapping[str, Any]]) -> str:
+    """What of the cross error, and of the yaw that goes with it, is roll."""
+    known = [row for row in rows if None not in (row["cross_roll_correlation"], row["yaw_roll_correlation"])]
+    if not known:
+        return ""
+    far = max(known, key=lambda row: row["range_m"])
+    return (
+        "What moves the cross estimate is the heading of the sight line to the threshold,"
+        f" {figure(far['sight_line_down_deg'])}° below the horizon at {figure(far['range_m'])} m."
+        " A roll error turns it by the sine of that angle, which over the range is the camera's height times the roll."
+        f" The yaw shares it as far as the optical axis, {figure(far['optical_axis_down_deg'])}° down, lies near that"
+        f" line. With `{far['reading']}` the roll error explains {_share(far['cross_roll_correlation'])} of the cross"
+        f" error's variance there and {_share(far['yaw_roll_correlation'])} of the yaw's: a camera pitched otherwise"
+        " has another yaw error and the same cross error."
+    )
 
 
 def roll(verdict: Verdict) -> str:
     """What a roll error does late."""
-    shifts, limits = verdict["roll_shifts"], verdict["roll_limits"]
+    limits = verdict["roll_limits"]
+    shifts = [s for s in verdict["roll_shifts"] if s["measured_m"] is not None]
     parts = []
     if shifts:
         off = shifts[0]["roll_error_deg"]
@@ -202,22 +225,37 @@ def roll(verdict: Verdict) -> str:
 
 def _limits(reading: str, limits: Sequence[Mapping[str, Any]]) -> str:
     none = [x["quantity"] for x in limits if x["roll_error_deg"] is None]
-    some = [x for x in limits if x["roll_error_deg"] is not None]
+    some = sorted((x for x in limits if x["roll_error_deg"] is not None), key=lambda x: x["roll_error_deg"])
     words = []
     if some:
         stated = [
             f"{x['quantity']} ({with_unit(x['bound'], x['unit'])}) {'beyond' if x['holds_beyond'] else 'up to'}"
             f" {with_unit(x['roll_error_deg'], 'deg')}"
-            for x in sorted(some, key=lambda x: x["roll_error_deg"])
+            for x in some
         ]
-        words.append(f"the bounds hold at 95 % to the end of the stage with a roll error of: {listed(stated)}")
+        words.append(
+            f"the bounds hold at {AT} to the end of the stage with a roll error of either sign: {listed(stated)}"
+        )
     if none:
         words.append(f"{listed(none)} {'do' if len(none) > 1 else 'does'} not hold even with the true roll")
-    worst = max(abs(x["p95_over_bound"] - 1.0) for x in some if not x["holds_beyond"]) if some else None
-    text = f"With `{reading}` {'; '.join(words)}."
-    if worst is not None:
-        text += f" Sampled there, the 95th percentile is within {figure(100.0 * worst)} % of the bound."
-    return text
+    parts = [f"With `{reading}` {'; '.join(words)}."]
+    without = [x for x in some if x["limited_by"] == "no solution"]
+    if without:
+        heights = sorted({with_unit(x["at_height_m"], "m") for x in without})
+        names = listed([x["quantity"] for x in without]).capitalize()
+        parts.append(
+            f"{names} {'are' if len(without) > 1 else 'is'} limited by no solution: beyond that, most of the draws that"
+            f" do not keep the bound are two lines without one, at a camera height of {listed(heights)}."
+        )
+    off = [
+        abs(x["p95_over_bound"] - 1.0) for x in some if x["limited_by"] == "bound" and x["p95_over_bound"] is not None
+    ]
+    if off:
+        parts.append(f"Sampled there, the {LEVEL:g}th percentile is within {figure(100.0 * max(off))} % of the bound.")
+    doubtful = [x["quantity"] for x in some if not x["confirmed"]]
+    if doubtful:
+        parts.append(f"Independent draws do not confirm it for {listed(doubtful)}.")
+    return " ".join(parts)
 
 
 def fused(verdict: Verdict) -> str:
@@ -233,27 +271,27 @@ def fused(verdict: Verdict) -> str:
     for reading, f in flights.items():
         ends = listed([f"{number} {outcome}" for outcome, number in f["outcomes"].items()])
         text = (
-            f"With `{reading}` the fused errors are those of {f['flights']} flights in JSBSim, seeds {f['first_seed']}"
-            f" to {f['last_seed']} ({ends})."
+            f"With `{reading}` the fused errors are those of {f['flights']} flight{'' if f['flights'] == 1 else 's'} in"
+            f" JSBSim, seeds {f['first_seed']} to {f['last_seed']} ({ends})."
         )
         if f["fused_in_all_from_m"] is not None:
             text += (
                 f" The filter starts from the first frames' poses and runs in every flight from"
-                f" {figure(f['fused_in_all_from_m'])} m on; before that there is no fused solution, and it is judged"
-                f" from {figure(f['fused_from_m'])} m on."
+                f" {figure(f['fused_in_all_from_m'])} m on, from where it is judged."
             )
         if f["late_roll"]:
             worst = max(f["late_roll"], key=lambda at: at["p95_deg"])
             text += (
                 f" The roll angle that it lends to the late stage is off by at most"
-                f" {with_unit(worst['p95_deg'], 'deg')} at 95 % (at {figure(worst['range_m'])} m)"
+                f" {with_unit(worst['p95_deg'], 'deg')} in {AT} of the flights at each of the listed ranges (most at"
+                f" {figure(worst['range_m'])} m)"
                 f"{_borne(verdict, reading)}."
             )
         parts.append(text)
         for stage in OF_STAGE:
-            judged = [e for e in find(verdict, stage, reading, "fused") if e["bound"] is not None]
+            judged = [e for e in find(verdict, stage, reading, "fused") if e["holds"] is not None]
             if judged:
-                parts.append(_reach(reading, judged, stage, "holds_from_m", f"Fused, {stage}, at 95 %"))
+                parts.append(_reach(reading, judged, stage, "holds_from_m", f"Fused, {stage}, at {AT}"))
     return " ".join(parts)
 
 
@@ -263,4 +301,5 @@ def _borne(verdict: Verdict, reading: str) -> str:
     if not limits or any(x["roll_error_deg"] is None for x in limits):
         return ""
     least = min(limits, key=lambda x: x["roll_error_deg"])
-    return f", where the bound of {least['quantity']} bears {with_unit(least['roll_error_deg'], 'deg')}"
+    bears = f"{'more than ' if least['holds_beyond'] else ''}{with_unit(least['roll_error_deg'], 'deg')}"
+    return f", where the bound of {least['quantity']} bears {bears}"

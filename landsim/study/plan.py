@@ -10,6 +10,9 @@ from landsim.errors import ScenarioError
 from landsim.study.frames import Frames, at_distances, straight_approach
 from landsim.study.model import StageName
 
+LEAST_NOISE_PX = 1e-6
+"""Below it, errors are those of rounding."""
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -42,14 +45,19 @@ def plan_of(scenario: Scenario) -> Plan:
     Raises
     ------
     ScenarioError
-        If the straight approach does not have a stage, or if a listed range is not in one: the lines that the stage
-        needs are not in the image there, or the approach does not pass it.
+        If the lines are without noise; if the straight approach does not have a stage, or if a listed range is not in
+        one: the lines that the stage needs are not in the image there, or the approach does not pass it.
     ValueError
         If the scenario is not a study.
     """
     study = scenario.study
     if study is None:
         raise ValueError(f"{scenario.name}: a scenario of the kind {scenario.kind!r} is not studied")
+    if scenario.camera.noise_px < LEAST_NOISE_PX:
+        raise ScenarioError(
+            f"{scenario.path}: camera.noise_px: must be at least {LEAST_NOISE_PX:g} to be studied, not"
+            f" {scenario.camera.noise_px:g}: without noise there are no errors"
+        )
     wanted: tuple[StageName, ...] = ("early", "late") if study.stage == "both" else (study.stage,)
     both = straight_approach(scenario)
     frames = tuple(f for f in both if f.stage in wanted)

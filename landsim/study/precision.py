@@ -1,10 +1,11 @@
-"""The line precision with which a bound holds, and the range from which it does.
+"""The line precision with which a bound holds.
 
 The precision is solved for to first order at every frame, corrected by sampling where it binds (at long range the tails
 are heavier than a Gaussian's), and confirmed with other draws.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,11 +18,10 @@ from landsim.sensors import camera_of
 from landsim.study.draws import draw_line, draw_lines, points_on, pose_errors
 from landsim.study.envelope import child, first_order, line_noise, percentiles, pose_sigma
 from landsim.study.frames import LINES_OF_STAGE, Frames
-from landsim.study.model import LEVELS, OF_STAGE, Envelope, Reading, StageName
+from landsim.study.model import CHANCE, JUDGED, LEVEL, NORMAL, OF_STAGE, Reading, StageName
 
-GAUSSIAN_95 = 1.959963984540054
-"""95 % of a Gaussian lie within so many of its σ."""
-P95 = LEVELS.index(95.0)
+SHARE = LEVEL / 100.0
+"""Of the errors that keeps the bound."""
 SOLVED = 2e-3
 """Relative difference between the sampled percentile and the bound at which the search ends."""
 ROUNDS = 12
@@ -30,16 +30,12 @@ FEW_POINTS = 16
 """Points a line with which a search makes do: see `_Question.tail`."""
 SEARCH_DRAWS = 4
 """Draws of a search for each one of the confirmation: its error must be the smaller one."""
+MOST_POINTS = 5_000_000
+"""On a line: a bound that asks for more is out of reach."""
 BUDGET = 60_000_000
 """Numbers that a confirmation draws at most, at the frame where the bound is met last; at others a quarter of it."""
 LEAST_DRAWS = 200
 """Fewer say nothing of a 95th percentile."""
-DOUBT = 3.0
-"""Standard errors by which a confirmation may miss 95 %."""
-REACH = 0.15
-"""Half the window of the local regression: relative to the distance, or to the whole way where that passes zero."""
-LEAST_POINTS = 5
-"""Of a local regression; with fewer in the window, a percentile is taken as it is."""
 
 
 @dataclass(frozen=True)
@@ -70,10 +66,13 @@ class Precision:
         95th percentile of the absolute error in them, rad or m; NaN without draws.
     within : float
         Part of the draws that keeps the bound; NaN without draws.
+    within_interval : (2,) tuple of float
+        In which that part is by the number of draws, at 95 %, see `wilson`; NaN without draws.
     checked : tuple of float
         Distances of this frame and of others that come within a tenth of it, m.
     confirmed : bool
-        Whether 95 % of the draws keep the bound at each of these, to `DOUBT` standard errors.
+        Whether no fewer than 95 % of the draws keep the bound at each of these, and at one of them no more either, to
+        `CHANCE` standard errors.  More may keep it if the ends suffice, or if one point less on a line breaks it.
     """
 
     stage: StageName
@@ -89,6 +88,7 @@ class Precision:
     draws: int
     p95: float
     within: float
+    within_interval: tuple[float, float]
     checked: tuple[float, ...]
     confirmed: bool
 
@@ -126,7 +126,8 @@ def required_precision(
     Returns
     -------
     Precision or None
-        None if there are no such frames, or if a line is not seen in one of them: no precision helps then.
+        None if there are no such frames, or if a line is not seen in one of them: no precision helps then.  None too
+        if a line would need more than `MOST_POINTS`.
 
     Raises
     ------
@@ -158,11 +159,15 @@ def required_precision(
     number = scenario.study.listed_draws if draws is None else draws
     longest = float(question.lengths.max())
     start, loosest = question.to_first_order(longest)
-    value = question.solve(start, loosest, longest, SEARCH_DRAWS * number, child(seed, 0))
+    if reading == "edge-points" and longest / start > MOST_POINTS:
+        return None
+    value, stepped = question.solve(start, loosest, longest, SEARCH_DRAWS * number, child(seed, 0))
     ratios = question.ratios(value)
     worst = int(np.argmax(ratios))
     main = question.confirm(value, worst, number, BUDGET, child(seed, 1))
     others = [question.confirm(value, i, number, BUDGET // 4, child(seed, 1)) for i in _near_worst(ratios)]
+    checks = (main, *others)
+    ends_suffice = reading == "edge-points" and value >= longest
     return Precision(
         stage=frames.stage,
         reading=reading,
@@ -170,15 +175,16 @@ def required_precision(
         bound=bound,
         noise_px=value if reading == "endpoints" else scenario.camera.noise_px,
         spacing_px=None if reading == "endpoints" else value,
-        ends_suffice=reading == "edge-points" and value >= longest,
+        ends_suffice=ends_suffice,
         first_order=start,
         distance=float(frames.distance[worst]),
         points=question.points(value, worst),
         draws=main.draws,
         p95=main.p95,
         within=main.within,
-        checked=tuple(float(frames.distance[check.frame]) for check in (main, *others)),
-        confirmed=main.passed and all(check.passed for check in others),
+        within_interval=wilson(main.within, main.draws),
+        checked=tuple(float(frames.distance[check.frame]) for check in checks),
+        confirmed=confirmed(checks, at_most=not (ends_suffice or stepped)),
     )
 
 
@@ -190,8 +196,28 @@ class _Check:
     within: float
 
     @property
-    def passed(self) -> bool:
-        return self.draws > 0 and self.within >= 0.95 - DOUBT * math.sqrt(0.95 * 0.05 / self.draws)
+    def off(self) -> float:
+        """By how many standard errors the share that keeps the bound is above the one that is asked."""
+        return (self.within - SHARE) / math.sqrt(SHARE * (1.0 - SHARE) / self.draws) if self.draws else math.nan
+
+
+def confirmed(checks: Sequence[_Check], *, at_most: bool) -> bool:
+    """Whether enough draws keep the bound at every frame; with `at_most`, and at one of them not too many."""
+    off = [check.off for check in checks]
+    return all(x >= -CHANCE for x in off) and (not at_most or any(abs(x) <= CHANCE for x in off))
+
+
+def wilson(share: float, draws: int) -> tuple[float, float]:
+    """The interval in which a probability is at 95 %, if it came to a share of so many draws; NaN without draws.
+
+    E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209-212: the probabilities p with |share - p| ≤ z √(p (1 - p)/n).
+    """
+    if draws == 0:
+        return math.nan, math.nan
+    z2 = NORMAL[JUDGED] ** 2 / draws
+    middle = share + 0.5 * z2
+    half = math.sqrt(z2 * (share * (1.0 - share) + 0.25 * z2))
+    return (middle - half) / (1.0 + z2), (middle + half) / (1.0 + z2)
 
 
 @dataclass(frozen=True)
@@ -220,7 +246,7 @@ class _Question:
         """95th percentile over bound at every frame, to first order."""
         spacing, noise = self.setting(value)
         sigma = first_order(self.camera, self.frames, self.reading, spacing, noise, self.width)[:, self.column]
-        return np.asarray(GAUSSIAN_95 * sigma / self.bound)
+        return np.asarray(NORMAL[JUDGED] * sigma / self.bound)
 
     def points(self, value: float, frame: int) -> tuple[int, int, int]:
         """On left edge, threshold and right edge of a frame."""
@@ -245,8 +271,12 @@ class _Question:
             low, high = (middle, high) if self.ratios(middle).max() <= 1.0 else (low, middle)
         return low, False
 
-    def solve(self, start: float, loosest: bool, longest: float, draws: int, seed: SeedSequence) -> float:
-        """The same by sampling: a secant in logarithms, kept between values that hold and values that do not."""
+    def solve(self, start: float, loosest: bool, longest: float, draws: int, seed: SeedSequence) -> tuple[float, bool]:
+        """The same by sampling: a secant in logarithms, kept between values that hold and values that do not.
+
+        Second, whether the percentile steps over the bound: the value holds with room to spare, and the least bit more
+        does not.
+        """
         slope = 1.0 if self.reading == "endpoints" else 0.5
         value, holds, fails = start, 0.0, math.inf
         before: tuple[float, float] | None = None
@@ -272,7 +302,9 @@ class _Question:
                 value = 0.5 * fails
             if self.reading == "edge-points":
                 value, loosest = min(value, longest), value >= longest
-        return value if holds == 0.0 or abs(excess) < SOLVED else holds
+        if holds == 0.0 or abs(excess) < SOLVED:
+            return value, False
+        return holds, fails < holds * (1.0 + SOLVED)
 
     def tail(self, value: float, frame: int, draws: int, seed: SeedSequence) -> float:
         """Sampled 95th percentile of a frame over that of the first order.
@@ -295,7 +327,7 @@ class _Question:
                 fits.append(draw_line(ends, *how, draws, rng))
         errors = pose_errors(self.camera, self.frames, frame, fits, self.width)[:, self.column]
         sigma = pose_sigma(self.camera, self.frames[frame : frame + 1], known, self.width)[0, self.column]
-        return float(percentiles(errors[:, None])[0, P95] / (GAUSSIAN_95 * sigma))
+        return float(percentiles(errors[:, None])[0, JUDGED] / (NORMAL[JUDGED] * sigma))
 
     def confirm(self, value: float, frame: int, draws: int, budget: int, seed: SeedSequence) -> _Check:
         """Every point of every line drawn, at a frame."""
@@ -307,69 +339,10 @@ class _Question:
         fits = draw_lines(self.frames.ends[frame], which, self.reading, spacing, noise, number, rng)
         errors = pose_errors(self.camera, self.frames, frame, fits, self.width)[:, self.column]
         within = float(np.mean(np.abs(errors) <= self.bound))
-        return _Check(frame, number, float(percentiles(errors[:, None])[0, P95]), within)
+        return _Check(frame, number, float(percentiles(errors[:, None])[0, JUDGED]), within)
 
 
 def _near_worst(ratios: Array) -> list[int]:
     """The first and the last of the other frames that come within a tenth of the worst."""
     near = set(np.flatnonzero(ratios >= 0.9 * ratios.max()).tolist()) - {int(np.argmax(ratios))}
     return sorted({min(near), max(near)}) if near else []
-
-
-def holds_from(envelope: Envelope, quantity: str, bound: float) -> float | None:
-    """The greatest distance from which a quantity's 95th percentile keeps a bound to the end of the stage.
-
-    Single frames' percentiles are noisy, so it is read off a local regression: at each frame a straight line through
-    the logarithms of the percentiles within ±15 %, over the logarithm of the distance; over the distance itself, and
-    within 15 % of the way, where the stage passes the threshold.
-
-    Parameters
-    ----------
-    envelope : Envelope
-    quantity : str
-        Of `Envelope.quantities`.
-    bound : float
-        rad or m.
-
-    Returns
-    -------
-    float or None
-        m, negative past the threshold.  The first distance if the bound always holds, None if it does not hold at the
-        end.  Where there is no percentile, or no solution in more than one of 20 draws, no bound holds.
-    """
-    p95 = envelope.percentiles[:, envelope.quantities.index(quantity), P95]
-    distance = envelope.distance
-    if p95.size == 0:
-        return None
-    known = np.isfinite(p95)
-    logarithmic = bool((distance > 0.0).all())
-    way = max(float(np.ptp(distance)), 1e-9)
-    x = np.log(distance) if logarithmic else distance / way
-    excess = np.full(p95.shape, math.inf)
-    with np.errstate(divide="ignore"):
-        excess[known] = _smooth(x[known], np.log(p95[known])) - math.log(bound)
-    over = np.flatnonzero(excess > 0.0)
-    if over.size == 0:
-        return float(distance[0])
-    last = int(over[-1])
-    if last == p95.size - 1:
-        return None
-    share = 0.0
-    if math.isfinite(excess[last]) and math.isfinite(excess[last + 1]):
-        share = float(excess[last + 1] / (excess[last + 1] - excess[last]))
-    crossing = float(x[last + 1] + share * (x[last] - x[last + 1]))
-    return math.exp(crossing) if logarithmic else crossing * way
-
-
-def _smooth(x: Array, y: Array) -> Array:
-    """Local straight lines through y over x, each read at its middle."""
-    smooth = y.copy()
-    for i, middle in enumerate(x):
-        near = (np.abs(x - middle) <= REACH) & np.isfinite(y)
-        if near.sum() >= LEAST_POINTS:
-            dx, values = x[near] - middle, y[near]
-            mean_x, mean_y = dx.mean(), values.mean()
-            square = float(((dx - mean_x) ** 2).sum())
-            slope = float(((dx - mean_x) * (values - mean_y)).sum()) / square if square > 0.0 else 0.0
-            smooth[i] = mean_y - slope * mean_x
-    return smooth

@@ -53,7 +53,7 @@ EXAMPLE_ROLL = 0.2 * DEG
 PROPORTION_DRAWS = 5000
 """At each listed range."""
 
-# Places of the work in the study's seed.
+# Places of the work in the study's seed; the next, 6, is `landsim.study.verdict.RESAMPLING`.
 _FRAMES, _LISTED, _PRECISION, _ROLL, _PROPORTION, _CLAIMS = range(6)
 
 

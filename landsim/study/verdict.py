@@ -3,12 +3,18 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from numpy.random import SeedSequence
+
 from landsim.config import Scenario
+from landsim.study.envelope import child
 from landsim.study.evidence import flights_entry, meeting_entries, proportion_entries, roll_entries, shift_entries
-from landsim.study.geometry import LEVEL, Proportion, RollLimit
+from landsim.study.geometry import Proportion, RollLimit
 from landsim.study.judged import bound_key, bounds_of, entries_of, study_of
-from landsim.study.model import LEVELS, OF_STAGE, QUANTITIES, Envelope
+from landsim.study.model import LEVEL, LEVELS, OF_STAGE, QUANTITIES, Envelope
 from landsim.study.precision import Precision
+
+RESAMPLING = 6
+"""Place of the intervals over the flights in the study's seed, after those of `landsim.study.run`."""
 
 
 def verdict_of(
@@ -39,6 +45,12 @@ def verdict_of(
         The flights and their envelopes, as for `flights_entry`.
     """
     study = study_of(scenario)
+    behind = []
+    if rows:
+        from landsim.study.flights import flown_errors  # what flies is not needed to read a verdict
+
+        readings = dict.fromkeys(row["line_noise"] for row in rows)
+        behind = [one for reading in readings for one in flown_errors(scenario, [dict(row) for row in rows], reading)]
     stages = dict.fromkeys(e.stage for e in envelopes)
     bounds = {
         stage: {bound_key(QUANTITIES[name]): value / QUANTITIES[name].scale for name, value in of.items()}
@@ -54,12 +66,12 @@ def verdict_of(
         "judged_at_percent": LEVEL,
         "draws": {"frame": study.draws, "listed": study.listed_draws} if study.method == "sampling" else None,
         "bounds": bounds,
-        "entries": entries_of(scenario, envelopes, listed, precisions),
+        "entries": entries_of(scenario, envelopes, listed, precisions, behind, child(SeedSequence(seed), RESAMPLING)),
         "meeting": meeting_entries(study, envelopes),
         "proportions": proportion_entries(found),
         "roll_limits": roll_entries(roll_limits),
         "roll_shifts": shift_entries(scenario, shifts),
-        "flights": flights_entry(rows, flown, study.ranges_m, seed),
+        "flights": flights_entry(rows, flown, study.ranges_m, seed, study.end_height_m),
     }
 
 
