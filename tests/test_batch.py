@@ -13,18 +13,10 @@ from approach import paper
 from numpy.typing import NDArray
 from synthetic import empty_log
 
-from landsim import batch
-from landsim.batch import (
-    ARRAYS,
-    SCALARS,
-    by_distance,
-    distances_of,
-    flight_row,
-    fly_rows,
-    load_rows,
-    save_rows,
-    workers,
-)
+from landsim.batch import row as batch
+from landsim.batch.pool import fly_rows, workers
+from landsim.batch.row import ARRAYS, SCALARS, by_distance, distances_of, flight_row
+from landsim.batch.rows import load_rows, save_rows
 from landsim.config import Scenario, load_scenario
 from landsim.errors import InputError, RunFolderError
 from landsim.log import QUANTITIES, Log

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from approach import PROTOTYPE, paper
 
-from landsim.batch import ARRAYS, SCALARS, Row
+from landsim.batch.row import ARRAYS, SCALARS, Row
 from landsim.log import QUANTITIES as COLUMNS
 from landsim.study.flights import as_flight, attitude_errors, envelopes, fly_study, load_rows, of_reading, save_rows
 from landsim.study.model import OF_STAGE, Envelope

@@ -147,7 +147,7 @@ def flights_entry(
     Parameters
     ----------
     rows : sequence of mapping
-        Of `landsim.batch.flight_row`.
+        Of `landsim.batch.row.flight_row`.
     envelopes : sequence of Envelope
         Of the flights.
     ranges : sequence of float

@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.so3 import Array, from_euler
-from landsim.batch import Row, distances_of, fly_rows, load_rows, save_rows
+from landsim.batch.pool import fly_rows
+from landsim.batch.row import Row, distances_of
+from landsim.batch.rows import load_rows, save_rows
 from landsim.config import Scenario
 from landsim.scene import runway_of
 from landsim.sensors import camera_of
@@ -64,7 +66,7 @@ def fly_study(
 ) -> list[Row]:
     """The flights of a study with one noise reading, one for each seed, with the study's ranges among the distances.
 
-    Parameters and result are those of `landsim.batch.fly_rows`.
+    Parameters and result are those of `landsim.batch.pool.fly_rows`.
     """
     return fly_rows(as_flight(scenario, reading), seeds, executor, progress, distances_of(scenario))
 

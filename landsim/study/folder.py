@@ -107,7 +107,7 @@ def write_study(
         (folder / TEXT_FILE).write_text(verdict_md(verdict), encoding="utf-8")
         save_envelopes(folder / ENVELOPES_FILE, envelopes, listed)
         if rows:
-            from landsim.batch import save_rows
+            from landsim.batch.rows import save_rows
 
             save_rows(folder / FLIGHTS_FILE, rows)
     except OSError as error:

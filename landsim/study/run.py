@@ -14,7 +14,7 @@ import numpy as np
 from numpy.random import SeedSequence
 
 from estimator.so3 import Array
-from landsim.batch import Row, distances_of, flight_row
+from landsim.batch.row import Row, distances_of, flight_row
 from landsim.config import Scenario, StudyConfig
 from landsim.errors import InputError
 from landsim.plain import as_json
@@ -70,7 +70,7 @@ class StudyResult:
     listed : tuple of Envelope
         At ``study.ranges_m``, with ``study.listed_draws``; none if nothing is sampled.
     rows : tuple of dict
-        The flights, see `landsim.batch.flight_row`.
+        The flights, see `landsim.batch.row.flight_row`.
     verdict : dict
         As in verdict.json.
     """

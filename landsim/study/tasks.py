@@ -7,7 +7,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
-from landsim.batch import workers
+from landsim.batch.pool import workers
 
 Progress = Callable[[float, float, str], None]
 """Told how much is done, of how much, and what is being done."""

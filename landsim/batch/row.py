@@ -1,4 +1,4 @@
-"""Many flights of one scenario: a flight as a row of numbers, rows from any executor, and rows as Parquet.
+"""One flight as a row of numbers.
 
 ``flight_row`` is a pure function of scenario and seed, but for the wall time that it reports.  A row has what a flight
 was worth as scalars, and its navigation errors by distance to the threshold as arrays, so that flights that are flown
@@ -6,12 +6,6 @@ at different speeds can be laid over each other.
 """
 
 import math
-import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
-from multiprocessing import get_context
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -19,13 +13,11 @@ from numpy.typing import ArrayLike
 
 from estimator.so3 import Array
 from landsim.config import Scenario
-from landsim.errors import InputError, RunFolderError
+from landsim.errors import InputError
 from landsim.log import QUANTITIES, Log
 from landsim.metrics import CRASHES, EARLY_NUMBERS, LATE_NUMBERS, error
-from landsim.parquet import read_table, write_table
 from landsim.simulate import Flight, fly, must_fly
 from landsim.state import Stage
-from landsim.threads import THREAD_VARIABLES
 
 Row: TypeAlias = dict[str, Any]
 
@@ -213,123 +205,3 @@ def _offered(log: Log) -> Array:
     waiting = np.isnan(log["fused_along_m"]) | (np.isnan(offered) & (log["stage"] == Stage.EARLY))
     early = (offered == EARLY_NUMBERS) | (three & waiting)
     return np.select([early, offered == LATE_NUMBERS], [float(Stage.EARLY), float(Stage.LATE)], float(Stage.NONE))
-
-
-def fly_rows(
-    scenario: Scenario,
-    seeds: Sequence[int],
-    executor: Executor | None = None,
-    progress: Callable[[Row], None] | None = None,
-    distances: ArrayLike | None = None,
-) -> list[Row]:
-    """Fly a scenario once for each seed.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Of the kind ``flight``.
-    seeds : sequence of int
-    executor : concurrent.futures.Executor, optional
-        Of any make, such as `workers` yields; without it the flights are flown here, one after the other.
-    progress : callable, optional
-        Is given each row when it is finished, in any order.
-    distances : (n,) array_like, optional
-        As for `flight_row`.
-
-    Returns
-    -------
-    list of dict
-        In the order of the seeds, whoever flew them.
-
-    Raises
-    ------
-    InputError, ValueError
-        As `flight_row` does; what has not begun then is not flown.
-    """
-    if executor is None:
-        rows = []
-        for seed in seeds:
-            rows.append(flight_row(scenario, seed, distances))
-            if progress is not None:
-                progress(rows[-1])
-        return rows
-    futures: list[Future[Row]] = []
-    try:
-        futures += (executor.submit(flight_row, scenario, seed, distances) for seed in seeds)
-        for future in as_completed(futures):
-            row = future.result()
-            if progress is not None:
-                progress(row)
-        return [future.result() for future in futures]
-    except BaseException:
-        for future in futures:
-            future.cancel()
-        raise
-
-
-@contextmanager
-def workers(count: int) -> Iterator[ProcessPoolExecutor]:
-    """A pool of processes for `fly_rows`, each with the matrix libraries on one thread.
-
-    The filter's matrices are small: more threads make them slower, and the processes' threads would compete.  The
-    libraries read their number of threads once, when numpy loads them.  A forked process has numpy already, and may
-    inherit a lock that one of its parent's other threads holds; so the processes are spawned.  Those load numpy as soon
-    as they unpickle anything from here, before an initializer of the pool could run: the number has to be in the
-    environment that they are born with, and stands in this process's for as long as the pool does.  It changes nothing
-    here, where numpy is loaded.
-
-    Parameters
-    ----------
-    count : int
-        Of processes.
-    """
-    before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
-    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
-    pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"))
-    try:
-        yield pool
-    finally:
-        pool.shutdown(cancel_futures=True)
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
-
-
-def save_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows as Parquet, a row a flight, arrays as lists; written beside and then renamed.
-
-    Parameters
-    ----------
-    path : Path
-    rows : sequence of dict
-        Of `flight_row`.
-    """
-    import pyarrow as pa
-
-    kinds = {int: pa.int64(), float: pa.float64(), bool: pa.bool_(), str: pa.string()}
-    columns = {name: pa.array([row[name] for row in rows], kinds[kind]) for name, kind in SCALARS.items()}
-    for name in ARRAYS:
-        values = [np.asarray(row[name], dtype=float) for row in rows]
-        ends = np.cumsum([0, *(v.size for v in values)], dtype=np.int32)
-        columns[name] = pa.ListArray.from_arrays(ends, pa.array(np.concatenate([np.empty(0), *values])))
-    write_table(path, pa.table(columns))
-
-
-def load_rows(path: Path) -> list[Row]:
-    """Rows as they were saved, bit for bit.
-
-    Raises
-    ------
-    RunFolderError
-        If the file is not there, is not Parquet or does not hold such rows.
-    """
-    table = read_table(path)
-    missing = [name for name in (*SCALARS, *ARRAYS) if name not in table.column_names]
-    if missing:
-        raise RunFolderError(f"{path}: is not a table of flights: column {missing[0]} is missing")
-    columns: dict[str, list[Any]] = {name: table[name].to_pylist() for name in SCALARS}
-    for name in ARRAYS:
-        columns[name] = [np.asarray(value.values.to_numpy(), dtype=float) for value in table[name]]
-    return [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
