@@ -99,9 +99,11 @@ def what_is_wrong(error: Mapping[str, Any]) -> str:
             close = nearest(value, str(context["expected"]).replace("'", "").replace(" or ", ", ").split(", "))
             hint = f'; did you mean "{close}"?' if close else ""
         return f"must be {str(context['expected']).replace(chr(39), chr(34))}, not {shown(value)}{hint}"
-    if kind in {"too_short", "too_long"}:
-        wanted = context.get("min_length", context.get("max_length"))
-        return f"must have {wanted} elements, not {context['actual_length']}"
+    if kind == "too_short":
+        least = context["min_length"]
+        return f"must have at least {least} element{'' if least == 1 else 's'}, not {context['actual_length']}"
+    if kind == "too_long":  # only arrays of a fixed length have a greatest one
+        return f"must have {context['max_length']} elements, not {context['actual_length']}"
     if kind == OWN_CHECK:
         return str(error["msg"])
     return f"{error['msg']}, not {shown(value)}"

@@ -194,7 +194,7 @@ REFUSED_STUDY: list[tuple[str, object, str]] = [
     ("study.darws", 1000, "override study.darws: unknown key; did you mean study.draws?"),
     ("study.bounds.cros_m", 1.0, "override study.bounds.cros_m: unknown key; did you mean study.bounds.cross_m?"),
     ("study.ranges_m", [100.0, 100.0], "override study.ranges_m: must fall from each to the next, not [100.0, 100.0]"),
-    ("study.ranges_m", [], "override study.ranges_m: must have 1 elements, not 0"),
+    ("study.ranges_m", [], "override study.ranges_m: must have at least 1 element, not 0"),
     ("study.readings", ["corner"], 'override study.readings.0: must be "endpoints" or "edge-points", not "corner"'),
     ("study.draws", 99, "override study.draws: must be at least 100, not 99"),
     ("study.bounds.yaw_deg", 0.0, "override study.bounds.yaw_deg: must be above 0, not 0.0"),

@@ -310,7 +310,10 @@ def test_a_path_that_does_not_sink_has_no_late_heights(study: Path) -> None:
 
 def test_all_claims_are_json_and_tell_their_progress(scenario: Scenario) -> None:
     calls: list[int] = []
-    told = lambda: calls.append(1)  # noqa: E731
+
+    def told() -> None:
+        calls.append(1)
+
     result = {
         "translations": translations(scenario, SeedSequence(3), draws=100),
         "peers": peers(scenario, SeedSequence(4), draws=50, progress=told),
