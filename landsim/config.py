@@ -3,9 +3,11 @@
 ``load_scenario("landing", overrides={"runway.width_m": 45.0})`` is the way in; ``resolved_toml`` is the way back.
 """
 
+import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from copy import deepcopy
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -22,13 +24,18 @@ from landsim.schema import (
     BoundsConfig,
     BoxConfig,
     CameraConfig,
+    CorrelationConfig,
+    DispersionsConfig,
+    DrawConfig,
     FlareGains,
     GearConfig,
     GuidanceConfig,
     ImuConfig,
+    LoadingConfig,
     MountConfig,
     NavigationConfig,
     PitotConfig,
+    PlugInsConfig,
     RolloutGains,
     RunwayConfig,
     Scenario,
@@ -38,7 +45,9 @@ from landsim.schema import (
     SpeedsConfig,
     StartConfig,
     StudyConfig,
+    WindConfig,
     field_names,
+    fields_by_key,
 )
 
 __all__ = [
@@ -50,13 +59,18 @@ __all__ = [
     "BoundsConfig",
     "BoxConfig",
     "CameraConfig",
+    "CorrelationConfig",
+    "DispersionsConfig",
+    "DrawConfig",
     "FlareGains",
     "GearConfig",
     "GuidanceConfig",
     "ImuConfig",
+    "LoadingConfig",
     "MountConfig",
     "NavigationConfig",
     "PitotConfig",
+    "PlugInsConfig",
     "RolloutGains",
     "RunwayConfig",
     "Scenario",
@@ -66,11 +80,15 @@ __all__ = [
     "SpeedsConfig",
     "StartConfig",
     "StudyConfig",
+    "WindConfig",
     "load_aircraft",
     "load_scenario",
     "parse_setting",
     "resolved_toml",
 ]
+
+ALL_BUT_THE_SAME = 0.85
+"""Of 1: how alike a key of the same table has to be to one that is unknown, to be meant rather than one elsewhere."""
 
 _Model = TypeVar("_Model", bound=Section)
 
@@ -114,7 +132,7 @@ def load_scenario(name_or_path: str | Path, overrides: Mapping[str, object] | No
     name, folder = _named(path, overrides, settings.aircraft.name, base)
     if not is_text(name):
         raise ScenarioError(f"{_where('aircraft.name', path, overrides)}: must be UTF-8 text, not {name}")
-    sections = {key: getattr(settings, key) for key in ScenarioFile.model_fields}
+    sections = {key: getattr(settings, field) for key, field in fields_by_key(ScenarioFile).items()}
     return Scenario(
         **{**sections, "aircraft": AircraftChoice(name=name)},
         name=path.stem,
@@ -144,7 +162,7 @@ def resolved_toml(scenario: ScenarioFile) -> str:
     import tomli_w
 
     # TOML has no null: a key that is None is left out, which is what None stands for.
-    settings = {key: getattr(scenario, key) for key in ScenarioFile.model_fields}
+    settings = {key: getattr(scenario, field) for key, field in fields_by_key(ScenarioFile).items()}
     tables = {
         key: value.model_dump(exclude_none=True) if isinstance(value, Section) else value
         for key, value in settings.items()
@@ -219,11 +237,50 @@ def _override(table: dict[str, Any], key: str, value: object, path: Path) -> Non
     if not _is_dotted(key):
         raise ScenarioError(f"{path}: override {key!r}: must be a dotted key, such as runway.width_m")
     *tables, last = key.split(".")
-    for done, name in enumerate(tables, 1):
-        table = table.setdefault(name, {})
-        if not isinstance(table, dict):
+    for done, part in enumerate(tables, 1):
+        name, index = _indexed(part)
+        if index is None:
+            inner = table.setdefault(name, {})
+        else:
+            inner = _element(table.get(name), index, f"{path}: override {key}: {'.'.join([*tables[: done - 1], name])}")
+        if not isinstance(inner, dict):
             raise ScenarioError(f"{path}: override {key}: {'.'.join(tables[:done])} is not a table")
+        table = inner
     table[last] = deepcopy(value)  # later overrides may write into it
+
+
+def _indexed(part: str) -> tuple[str, int | None]:
+    """``draw[2]`` as a name and an index, and any other part of a key as it is."""
+    found = re.fullmatch(r"(.+)\[(\d{1,9})\]", part)
+    return (part, None) if found is None else (found[1], int(found[2]))
+
+
+def _element(tables: object, index: int, place: str) -> object:
+    if not isinstance(tables, list):
+        raise ScenarioError(f"{place} is not an array")
+    if index >= len(tables):
+        raise ScenarioError(f"{place} has {len(tables)} elements, so there is no [{index}]: the first is [0]")
+    return tables[index]
+
+
+def _dotted(place: Iterable[int | str]) -> str:
+    """A place in nested tables as a file's reader would write it: ``dispersions.draw[2].sigma``."""
+    text = ""
+    for name in place:
+        text += f"[{name}]" if isinstance(name, int) else f".{name}" if text else name
+    return text
+
+
+def _whose(table: Any, place: Iterable[int | str]) -> str:
+    """Which key a place in a draw speaks of, since the draws of a file bear no numbers."""
+    for name in place:
+        try:
+            table = table[name]
+        except (LookupError, TypeError):
+            return ""
+        if isinstance(name, int) and isinstance(table, dict) and isinstance(table.get("key"), str):
+            return f" ({table['key']})"
+    return ""
 
 
 def _validated(
@@ -239,11 +296,11 @@ def _validated(
     place = tuple(name for name in error["loc"] if not (isinstance(name, str) and name.startswith("function-")))
     if key := error.get("ctx", {}).get("key"):
         place += tuple(key.split("."))
-    dotted = ".".join(str(name) for name in place)
+    dotted = _dotted(place) + _whose(table, place)
     if error["type"] == "extra_forbidden":
         what = f"unknown key{_meant(model, place)}"
     elif error["type"] == "missing" and isinstance(place[-1], int):
-        dotted = ".".join(str(name) for name in place[:-1])
+        dotted = _dotted(place[:-1])
         what = f"element {place[-1] + 1} is missing"
     else:
         what = what_is_wrong(dict(error))
@@ -254,11 +311,12 @@ def _validated(
 def _meant(model: type[Section], place: tuple[int | str, ...]) -> str:
     """The end of a message about an unknown key: where a key of that very name is, or the nearest one in its table."""
     name = str(place[-1])
+    here = field_names(model, place[:-1])
     elsewhere = [key for key in _keys(model) if key.rpartition(".")[2] == name]
-    if elsewhere:
+    if elsewhere and not get_close_matches(name, here, cutoff=ALL_BUT_THE_SAME):
         *first, last = elsewhere
         return f"; did you mean {', '.join(first)}{' or ' if first else ''}{last}?"
-    return did_you_mean(name, field_names(model, place[:-1]), "".join(f"{name}." for name in place[:-1]))
+    return did_you_mean(name, here, _dotted([*place[:-1], ""]))
 
 
 def _keys(model: type[Section], place: tuple[str, ...] = ()) -> Iterator[str]:
@@ -273,5 +331,9 @@ def _keys(model: type[Section], place: tuple[str, ...] = ()) -> Iterator[str]:
 
 def _where(dotted: str, path: Path, overrides: Mapping[str, object]) -> str:
     """File and key; says so when it is not the file that holds the value."""
-    overridden = any(f"{dotted}.".startswith(f"{key}.") or f"{key}.".startswith(f"{dotted}.") for key in overrides)
+    bare = dotted.partition(" ")[0]
+    overridden = any(
+        bare == key or bare.startswith((f"{key}.", f"{key}[")) or key.startswith((f"{bare}.", f"{bare}["))
+        for key in overrides
+    )
     return f"{path}: {'override ' if overridden else ''}{dotted}"

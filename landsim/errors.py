@@ -2,6 +2,8 @@
 
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from traceback import extract_tb
 from typing import Any
 
 OWN_CHECK = "landsim"
@@ -13,6 +15,18 @@ _LONGEST_VALUE = 60
 def one_line(text: str) -> str:
     """The text with everything that does not print escaped, so that it stays on one line."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode("ascii") for c in text)
+
+
+def traceback_of(failure: BaseException) -> str:
+    """Where an exception came from, a line a call, the innermost last.
+
+    Files are named without their folders: the same failure reads the same on every machine that flies for a batch.
+    """
+    calls = [
+        f"{Path(call.filename).name}:{call.lineno} in {call.name}: {call.line}"
+        for call in extract_tb(failure.__traceback__)
+    ]
+    return "\n".join([*calls, f"{type(failure).__name__}: {failure}"])
 
 
 def is_text(value: str) -> bool:

@@ -63,9 +63,9 @@ COLUMNS: tuple[Column, ...] = (
     Column("stage", "", "", "landsim.state.Stage of the last frame: 0 none, 1 early, 2 late"),
     *_pose(),
     # the body
-    Column("body_x_m", "m", "runway", "true centre of gravity, along"),
-    Column("body_y_m", "m", "runway", "true centre of gravity, right of the centreline"),
-    Column("body_height_m", "m", "runway", "true centre of gravity, up"),
+    Column("body_x_m", "m", "runway", "true nominal centre of gravity, along"),
+    Column("body_y_m", "m", "runway", "true nominal centre of gravity, right of the centreline"),
+    Column("body_height_m", "m", "runway", "true nominal centre of gravity, up"),
     Column("wheel_height_m", "m", "runway", "true height of the midpoint of the main wheels, unloaded"),
     Column("body_roll_deg", "deg", "body in runway", "true bank angle"),
     Column("body_pitch_deg", "deg", "body in runway", "true pitch angle"),

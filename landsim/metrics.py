@@ -5,6 +5,7 @@ does not exist is None and never NaN, so that the result is valid JSON.
 """
 
 from collections.abc import Mapping
+from statistics import NormalDist
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -35,6 +36,8 @@ EARLY_NUMBERS, LATE_NUMBERS = 6, 4
 """Degrees of freedom of a measurement of three lines, and of two."""
 COASTING_S = 1.0
 """A filter that has believed no frame for longer is said to coast."""
+WITHIN = NormalDist().inv_cdf(0.975)
+"""Standard deviations either side of the mean that hold 95 % of a normal distribution."""
 BOUNCE_S = 0.1
 """Both main wheels in the air for longer than this, between contacts, is a bounce."""
 
@@ -281,6 +284,21 @@ def consistency(log: Log, touchdown: Touchdown | None) -> dict[str, dict[str, An
     }
 
 
+def coverage(log: Log, touchdown: Touchdown | None) -> dict[str, Any]:
+    """Share of the camera frames, from the filter's start to the touchdown, that are within the predicted 95 %.
+
+    Within: the magnitude of the fused error is at most `WITHIN` of the filter's own σ.  A filter that predicts its
+    errors well has 0.95 in each quantity, one that trusts itself too much has less.  ``frames`` is their number; a
+    share of none is None.
+    """
+    rows = np.arange(log["time_s"].size)
+    counted = np.isfinite(log["nees9"]) & (rows < (rows.size if touchdown is None else touchdown.row))
+    shares = {
+        q: _mean(np.abs(error(log, "fused", q)[counted]) <= WITHIN * log[f"sigma_{q}"][counted]) for q in QUANTITIES
+    }
+    return {"frames": int(np.sum(counted)), **shares}
+
+
 def flight_metrics(
     log: Log,
     scenario: "Scenario",
@@ -319,8 +337,8 @@ def flight_metrics(
     dict
         ``scenario``, ``seed``, ``outcome``, ``reason``, ``start``, ``in_box``, ``box`` (a limit: value, limit, ok),
         ``touchdown``, ``bounces``, ``stop``, ``tracking`` (of the cg, to the touchdown; the glide slope also to the
-        flare, which leaves it), ``navigation`` (of the camera, to the touchdown), ``consistency``, ``end``,
-        ``flight_time_s``, ``wall_time_s``, ``versions``.  Every ``p95`` is of the magnitude.
+        flare, which leaves it), ``navigation`` (of the camera, to the touchdown), ``consistency``, ``coverage``,
+        ``end``, ``flight_time_s``, ``wall_time_s``, ``versions``.  Every ``p95`` is of the magnitude.
 
     Raises
     ------
@@ -361,6 +379,7 @@ def flight_metrics(
         },
         "navigation": navigation_errors(log, n if touchdown is None else touchdown.row),
         "consistency": consistency(log, touchdown),
+        "coverage": coverage(log, touchdown),
         "end": end,
         "flight_time_s": float(log["time_s"][-1]) if n else 0.0,
         "wall_time_s": wall_time_s,

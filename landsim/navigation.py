@@ -186,6 +186,21 @@ class Navigator:
         return None
 
     @property
+    def covariance(self) -> Array | None:
+        """Of the filter's errors (15, 15); None before it has started."""
+        return None if self.filter is None else self.filter.covariance
+
+    @property
+    def bias(self) -> Array | None:
+        """Of gyros and accelerometers (6,), rad/s and m/s²; None before the filter has started."""
+        return None if self.filter is None else self.filter.bias
+
+    @property
+    def ready(self) -> bool:
+        """Whether the filter has started."""
+        return self.filter is not None
+
+    @property
     def nominal(self) -> Array:
         """Position, velocity and attitude of the body (18,); not to be used before the filter has started."""
         return _UNKNOWN if self.filter is None else self.filter.nominal

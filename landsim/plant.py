@@ -3,7 +3,9 @@
 The only file that imports jsbsim; feet, pounds and degrees end here.  An aircraft's folder holds ``<model>.xml`` with
 ``Systems/`` and ``Engines/`` beside it.  The model must offer what :class:`Plant` reads and writes (``imu/*``,
 ``nav/*``, ``ap/*``; its first three contacts are the nose, left and right main wheels); a property that it lacks is an
-error, because JSBSim itself would make one silently.
+error, because JSBSim itself would make one silently.  To fly with another mass or centre of gravity than the nominal
+ones it needs three point masses, the first of all that it has, of no weight: at the nominal centre of gravity, ahead of
+it and behind it.
 
 JSBSim's ground is the ellipsoid, raised; the runway is a plane.  The terrain under the aircraft is therefore set to the
 runway's plane at every step, so that wheels touch where the runway frame's z says they do.
@@ -18,12 +20,13 @@ import numpy as np
 
 from estimator.compiled import compiled
 from estimator.so3 import Array, Vec3, rotate, rotate_back
+from estimator.strapdown import inertial
 from landsim.attitude import runway_attitude
 from landsim.errors import InputError
 from landsim.runway import Runway
 from landsim.state import Command
-from landsim.truth import InitialState, Truth
-from landsim.units import DEG, FT, LBF
+from landsim.truth import NOMINAL, InitialState, Loading, Truth
+from landsim.units import DEG, FT, INCH, LB, LBF
 
 RUN_UP_S = 1.0
 """Time the engine runs, airframe held, before trim: JSBSim's search for a steady propeller diverges from standstill."""
@@ -87,6 +90,11 @@ _BALANCES = (  # what trim brings to zero, its tolerance in JSBSim's units, and 
 )
 
 
+_TURN = ("velocities/r-rad_sec", "velocities/q-rad_sec")
+_BALLAST = "inertia/pointmass-weight-lbs"
+CALM: Vec3 = (0.0, 0.0, 0.0)
+
+
 class PlantError(InputError):
     """The model cannot be loaded, or lacks a property."""
 
@@ -139,6 +147,33 @@ class _Listener(jsbsim.FGLogger):
     @property
     def heard(self) -> str:
         return " ".join("".join(self._words).split())
+
+
+def _direction(initial: InitialState) -> Vec3:
+    """Of flight over the ground, runway frame."""
+    climb, heading = initial.flight_path, initial.heading
+    return math.cos(climb) * math.cos(heading), math.cos(climb) * math.sin(heading), -math.sin(climb)
+
+
+def velocities(initial: InitialState) -> tuple[Vec3, Vec3]:
+    """Over the ground and through the air, runway frame, m/s.
+
+    Along the ground's direction d the speed is the s for which |s d - wind| is the airspeed.
+
+    Raises
+    ------
+    TrimError
+        When the wind across or ahead is faster than the aircraft.
+    """
+    along, wind, speed = _direction(initial), initial.wind, initial.speed
+    ahead = along[0] * wind[0] + along[1] * wind[1] + along[2] * wind[2]
+    square = ahead * ahead - (wind[0] ** 2 + wind[1] ** 2 + wind[2] ** 2) + speed * speed
+    over = ahead + math.sqrt(max(square, 0.0))
+    if square <= 0.0 or over <= 0.0:
+        strength = math.hypot(*wind)
+        raise TrimError(f"at {speed:.1f} m/s through the air it makes no way against a wind of {strength:.1f} m/s")
+    x, y, z = (over * a for a in along)
+    return (x, y, z), (x - wind[0], y - wind[1], z - wind[2])
 
 
 def _listen() -> _Listener:
@@ -199,16 +234,18 @@ class Plant:
         Whose frame is used, and whose plane is the ground.
     rate_hz : float
         Steps a second.
+    loading : Loading
+        How its mass differs from the nominal one.
 
     Raises
     ------
     PlantError
-        When the model does not load or lacks a property.
+        When the model does not load, lacks a property, or has no point masses and is to be loaded by them.
     """
 
     trim: TrimPoint
 
-    def __init__(self, folder: Path, model: str, runway: Runway, rate_hz: float) -> None:
+    def __init__(self, folder: Path, model: str, runway: Runway, rate_hz: float, loading: Loading = NOMINAL) -> None:
         self._runway = runway
         self._site = np.array(
             (
@@ -233,6 +270,13 @@ class Plant:
         self._feed = tuple(node(fdm, name).set_double_value for name in _FEED)
         self._command = tuple(node(fdm, name).set_double_value for name in _COMMAND)
         self._set_terrain = node(fdm, "position/terrain-elevation-asl-ft").set_double_value
+        self._loading = loading
+        self._turn = tuple(node(fdm, name).get_double_value for name in _TURN)
+        if loading != NOMINAL and any(manager.get_node(f"{_BALLAST}[{i}]", False) is None for i in range(3)):
+            raise PlantError(
+                f"{self._path}: the model cannot be loaded with another mass or centre of gravity: it needs three"
+                " <pointmass> of no weight, at the centre of gravity, ahead of it and behind it"
+            )
 
     def _set(self, name: str, value: float) -> None:
         node(self._fdm, name).set_double_value(value)
@@ -260,18 +304,23 @@ class Plant:
         self._started = True
         latitude, longitude, height = self._runway.to_geodetic(initial.position)
         R_runway_from_ned = self._runway.R_runway_from_ned_at(latitude, longitude)
-        climb, heading = initial.flight_path, initial.heading
-        direction = (math.cos(climb) * math.cos(heading), math.cos(climb) * math.sin(heading), -math.sin(climb))
-        north, east, down = rotate_back(R_runway_from_ned, direction)
+        calm = initial.wind == CALM
+        ground, air = (_direction(initial),) * 2 if calm else velocities(initial)
+        north, east, down = rotate_back(R_runway_from_ned, air)
         self._set("ic/lat-geod-deg", latitude / DEG)
         self._set("ic/long-gc-deg", longitude / DEG)
         self._set("ic/terrain-elevation-ft", (height + initial.position[2] / R_runway_from_ned[8]) / FT)
         self._set("ic/h-sl-ft", height / FT)
         self._set("ic/psi-true-deg", math.atan2(east, north) / DEG % 360.0)
-        self._set("ic/vt-fps", initial.speed / FT)
-        self._set("ic/gamma-deg", math.atan2(-down, math.hypot(north, east)) / DEG)
+        if calm:
+            self._set("ic/vt-fps", initial.speed / FT)
+            self._set("ic/gamma-deg", math.atan2(-down, math.hypot(north, east)) / DEG)
+        else:
+            self._set_wind(rotate_back(R_runway_from_ned, ground), rotate_back(R_runway_from_ned, initial.wind))
         try:
             self._fdm.run_ic()
+            if self._loading != NOMINAL:
+                self._load_up()
             # over raised terrain JSBSim misses the height it is given by millimetres
             self._set("ic/h-sl-ft", 2.0 * height / FT - self._get("position/geod-alt-ft"))
             self._fdm.run_ic()
@@ -292,6 +341,31 @@ class Plant:
             throttle=truth.throttle,
         )
         return truth
+
+    def _set_wind(self, ground: Vec3, wind: Vec3) -> None:
+        """Initial velocity over the ground and wind, north, east and down, m/s.
+
+        The order counts: with the wind set first, or with an airspeed in place of the velocity, JSBSim makes another
+        state of them.
+        """
+        for axis, speed in zip("ned", ground, strict=True):
+            self._set(f"ic/v{axis}-fps", speed / FT)
+        self._set("ic/vw-mag-fps", math.hypot(wind[0], wind[1]) / FT)
+        self._set("ic/vw-dir-deg", math.atan2(wind[1], wind[0]) / DEG % 360.0)  # whither it blows
+
+    def _load_up(self) -> None:
+        """Give the point masses the weights that make mass and centre of gravity those of the loading.
+
+        The two ahead and behind weigh w and -w: no mass, and to first order no moment of inertia.
+        """
+        before, at = self._get("inertia/weight-lbs"), self._get("inertia/cg-x-in")
+        extra, wanted = self._loading.extra_mass / LB, at - self._loading.cg_forward / INCH
+        if not before + extra > 0.0:
+            raise TrimError(f"no mass is left: {before * LB:.1f} kg and {self._loading.extra_mass:.1f} kg")
+        middle, ahead, behind = (self._get(f"inertia/pointmass-location-X-inches[{i}]") for i in range(3))
+        moved = ((before + extra) * wanted - before * at - extra * middle) / (ahead - behind)
+        for i, weight in enumerate((extra, moved, -moved)):
+            self._set(f"{_BALLAST}[{i}]", weight)
 
     def _run_up(self) -> None:
         """Run the engine at flying speed with the airframe held where it is."""
@@ -391,6 +465,12 @@ class Plant:
             self._set_terrain(altitude + down / (FT * cosine))
             nose, left, right = [read() != 0.0 for read in self._wheels]
             touching = any([read() != 0.0 for read in self._structure])  # noqa: C419 (a list is faster)
+        if self._loading.cg_forward != 0.0:
+            # from the centre of gravity, which JSBSim tells of, back to where it nominally is
+            back, (yawing, pitching) = -self._loading.cg_forward, [read() for read in self._turn]
+            attitude = inertial(motion).attitude
+            motion[:3] += rotate(attitude, (back, 0.0, 0.0))
+            motion[3:6] += rotate(attitude, (0.0, back * yawing, -back * pitching))
         return Truth(
             self._steps * self._dt,
             motion,

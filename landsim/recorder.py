@@ -22,6 +22,7 @@ from estimator.three_line import three_line_pose
 from estimator.two_line import two_line_pose
 from landsim.log import AXES, COLUMNS, ENDS, LINES, QUANTITIES
 from landsim.navigation import FrameResult, Navigator
+from landsim.plugins.guard import WITHOUT_BIASES, Belief, GuardedEstimator
 from landsim.sensors import Imu, View
 from landsim.state import Command, Phase
 from landsim.truth import Truth
@@ -110,7 +111,7 @@ class Recorder:
     def step(
         self,
         truth: Truth,
-        navigator: Navigator,
+        navigator: Navigator | GuardedEstimator,
         command: Command,
         phase: Phase,
         pitot: float,
@@ -118,13 +119,14 @@ class Recorder:
         reading: float,
     ) -> None:
         """Take down a step; the frame of the same step comes before it."""
+        nominal, ready, stage = navigator.nominal, navigator.ready, navigator.stage  # a plug-in's may raise
         self._count += 1
         self._truths.append(truth)
-        self._nominals.append(navigator.nominal)
+        self._nominals.append(nominal)
         self._commands.append(command)
-        self._others += (navigator.filter is not None, navigator.stage, phase, pitot, tilt, reading)
+        self._others += (ready, stage, phase, pitot, tilt, reading)
 
-    def frame(self, view: View, result: FrameResult, running: InertialVisionFilter | None, imu: Imu) -> None:
+    def frame(self, view: View, result: FrameResult, running: InertialVisionFilter | Belief | None, imu: Imu) -> None:
         """Take down a camera frame."""
         update = result.update
         self._frames += (result.roll, result.late, update.degrees, update.nis, update.accepted)
@@ -143,6 +145,7 @@ class Recorder:
         log = {column.name: np.full(self._count, np.nan) for column in COLUMNS}
         if self._count == 0:
             return log
+        self._drop_frame_without_step()
         ready, stage, phase, pitot, tilt, reading = _columns(self._count, self._others)
         truths = self._truths
         true, fused = _body([truth.motion for truth in truths]), _body(self._nominals)
@@ -176,6 +179,16 @@ class Recorder:
         self._frame_columns(log)
         self._filter_columns(log, true, fused, reading)
         return log
+
+    def _drop_frame_without_step(self) -> None:
+        """Leave out the last frame if what came after it in the same step raised."""
+        if self._frame_rows and self._frame_rows[-1] == self._count:
+            del self._frames[-len(FRAME) :]
+            for frames in (self._frame_rows, self._lines, self._true_ends, self._seen_ends):
+                del frames[-1]
+        if self._filter_rows and self._filter_rows[-1] == self._count:
+            for frames in (self._filter_rows, self._bias, self._errors, self._covariance):
+                del frames[-1]
 
     def _frame_columns(self, log: dict[str, Array]) -> None:
         """Columns that have a value at camera frames alone."""
@@ -224,13 +237,19 @@ class Recorder:
             ),
             axis=1,
         )
-        log["nees9"][at], log["nees15"][at] = normalised_squares(error, covariance, 9)
+        without = bool(np.isnan(covariance[:, WITHOUT_BIASES:, WITHOUT_BIASES:]).all())
+        if without:  # a plug-in's, which does not estimate biases
+            k = WITHOUT_BIASES
+            log["nees9"][at], _ = normalised_squares(error[:, :k], covariance[:, :k, :k], k)
+        else:
+            log["nees9"][at], log["nees15"][at] = normalised_squares(error, covariance, WITHOUT_BIASES)
         counts = np.diff(np.append(at, self._count))
 
         def held(name: str, values: Array) -> None:
             log[name][at[0] :] = np.repeat(values, counts)
 
-        sigma = camera_sigma(covariance, fused.attitude[at], self._mount, reading[at])
+        known = np.nan_to_num(covariance) if without else covariance
+        sigma = camera_sigma(known, fused.attitude[at], self._mount, reading[at])
         sigma[:, 3:] /= DEG
         for i, quantity in enumerate(QUANTITIES):
             held(f"sigma_{quantity}", sigma[:, i])

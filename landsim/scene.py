@@ -1,8 +1,10 @@
 """From the settings of a scenario to what the simulation is made of."""
 
 from estimator.alignment import Incidence
+from estimator.so3 import Vec3
 from landsim.config import AircraftConfig, Scenario
 from landsim.runway import Runway
+from landsim.truth import Loading
 from landsim.units import DEG
 
 
@@ -17,6 +19,21 @@ def runway_of(scenario: Scenario) -> Runway:
         longitude=r.longitude_deg * DEG,
         elevation=r.elevation_m,
     )
+
+
+def believed_width(scenario: Scenario) -> float:
+    """What navigation takes for the runway's width, m."""
+    return scenario.runway.width_m + scenario.runway.width_error_m
+
+
+def wind_of(scenario: Scenario) -> Vec3:
+    """Velocity of the air, runway frame, m/s: a head wind comes against x, a cross wind blows along y."""
+    return -scenario.wind.head_mps, scenario.wind.cross_mps, 0.0
+
+
+def loading_of(scenario: Scenario) -> Loading:
+    """What the aircraft carries besides its nominal mass, and where."""
+    return Loading(scenario.loading.extra_mass_kg, scenario.loading.cg_forward_m)
 
 
 def incidence_of(aircraft: AircraftConfig) -> Incidence:

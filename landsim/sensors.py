@@ -70,7 +70,7 @@ def imu_noise(config: ImuConfig) -> ImuNoise:
 
 
 class Imu:
-    """The inertial unit, at the centre of gravity: bias, bias drift, white noise and scale factor.
+    """The inertial unit, at the body's origin: bias, bias drift, white noise and scale factor.
 
     Parameters
     ----------
@@ -81,13 +81,13 @@ class Imu:
     """
 
     def __init__(self, config: ImuConfig, site: Site, start: Truth, rng: Generator) -> None:
-        noise = imu_noise(config)
+        noise, factor = imu_noise(config), config.error_factor
         self._dt = dt = 1.0 / config.rate_hz
-        self._drift = np.repeat((noise.gyro_drift, noise.accel_drift), 3) * math.sqrt(dt)
-        self._white = np.repeat((noise.gyro, noise.accel), 3) * math.sqrt(dt)
-        self._last_bias = rng.standard_normal(6)
+        self._drift = factor * np.repeat((noise.gyro_drift, noise.accel_drift), 3) * math.sqrt(dt)
+        self._white = factor * np.repeat((noise.gyro, noise.accel), 3) * math.sqrt(dt)
+        self._last_bias = factor * rng.standard_normal(6)
         self._last_bias *= (*[noise.gyro_bias] * 3, *[config.accel_bias_mg * MILLI_G] * 3)
-        self._scale = config.scale_factor * rng.standard_normal(6)
+        self._scale = factor * config.scale_factor * rng.standard_normal(6)
         self._rng = rng
         self._site = site.numbers()
         self._count = 0
@@ -146,7 +146,7 @@ def _white(sigma: float, rng: Generator) -> Iterator[float]:
 
 
 class Pitot:
-    """The airspeed: a first-order lag, and white noise on each sample.
+    """The airspeed: a first-order lag, an error of scale, and white noise on each sample.
 
     It gives true airspeed: that the density is known on board is an idealisation.
 
@@ -161,13 +161,14 @@ class Pitot:
 
     def __init__(self, config: PitotConfig, dt: float, start: Truth, rng: Generator) -> None:
         self._noise = _white(config.noise_mps, rng)
+        self._scale = 1.0 + config.scale_error
         self._gain = 1.0 if config.lag_s == 0.0 else 1.0 - math.exp(-dt / config.lag_s)
         self._lagged = start.airspeed
 
     def sample(self, truth: Truth) -> float:
         """Airspeed, m/s."""
         self._lagged += self._gain * (truth.airspeed - self._lagged)
-        return max(self._lagged + next(self._noise), 0.0)
+        return max(self._scale * self._lagged + next(self._noise), 0.0)
 
 
 class TiltMount:
@@ -179,26 +180,31 @@ class TiltMount:
     dt : float
         Between calls of `move`, s.
     rng : Generator
+    misalignment : float
+        Of the optical axis, rad: by so much it lies lower than the mount's angle says.
 
     Attributes
     ----------
     tilt : float
-        True angle, rad, down positive.
+        Of the optical axis below the body's forward axis, true, rad.
     """
 
-    def __init__(self, config: MountConfig, dt: float, rng: Generator) -> None:
-        self.tilt = config.tilt_early_deg * DEG
+    def __init__(self, config: MountConfig, dt: float, rng: Generator, misalignment: float = 0.0) -> None:
+        self._angle = config.tilt_early_deg * DEG
+        self._misalignment = misalignment
+        self.tilt = self._angle + misalignment
         self._step = config.tilt_rate_deg_s * DEG * dt
         self._noise = _white(config.tilt_reading_sigma_deg * DEG, rng)
 
     def move(self, command: float) -> None:
         """Move toward an angle (rad) for one step."""
-        if command != self.tilt:
-            self.tilt += max(-self._step, min(self._step, command - self.tilt))
+        if command != self._angle:
+            self._angle += max(-self._step, min(self._step, command - self._angle))
+            self.tilt = self._angle + self._misalignment
 
     def read(self) -> float:
         """The angle as read, rad."""
-        return self.tilt + next(self._noise)
+        return self._angle + next(self._noise)
 
 
 class View(NamedTuple):
@@ -215,11 +221,13 @@ class View(NamedTuple):
 class LineCamera:
     """Projects the painted lines, clips them, and reports noisy lines.
 
+    The lens that projects may be another than the `camera` that navigation believes in.
+
     Parameters
     ----------
     config : CameraConfig
     lever : (3,) float
-        Projection centre from the centre of gravity, body frame, m.
+        Projection centre from the body's origin, body frame, m.
     runway : Runway
     rng : Generator
     """
@@ -227,10 +235,11 @@ class LineCamera:
     def __init__(self, config: CameraConfig, lever: Vec3, runway: Runway, rng: Generator) -> None:
         camera = self.camera = camera_of(config)
         self._outages = config.outages_s
-        self._noise_px = config.noise_px
-        self._setup = np.array(
-            (*camera.intrinsics, camera.width, camera.height, config.near_m, config.min_line_px, *lever)
-        )
+        self._noise_px = config.noise_factor * config.noise_px
+        fx, fy, cx, cy = camera.intrinsics
+        longer = 1.0 + config.focal_length_error
+        lens = (longer * fx, longer * fy, cx, cy)
+        self._setup = np.array((*lens, camera.width, camera.height, config.near_m, config.min_line_px, *lever))
         self._corners = np.array((*runway.left_edge, *runway.right_edge))
         self._spacing = _spacing(config.line_noise, config.point_spacing_px)
         self._rng = rng

@@ -6,7 +6,7 @@ from the navigation state, and the plant's own inner loops fly it until the next
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -15,18 +15,19 @@ from numpy.random import Generator, SeedSequence, default_rng
 from estimator.so3 import Array, Vec3, rotate
 from estimator.strapdown import inertial
 from landsim.config import Scenario
-from landsim.errors import InputError
-from landsim.guidance import INITIAL, guide, law_of
+from landsim.dispersion import dispersed, draws_of_seed
+from landsim.errors import InputError, traceback_of
 from landsim.metrics import flight_metrics
-from landsim.navigation import Navigator, mount_of
+from landsim.navigation import mount_of
+from landsim.onboard import on_board
 from landsim.plant import Plant, StepError, TrimError
+from landsim.plugins import ControllerSetup, EstimatorSetup, PlugInFault, controller_of, estimator_of, versions_of
 from landsim.recorder import Recorder
 from landsim.runway import Runway
-from landsim.scene import incidence_of, runway_of
-from landsim.sensors import Imu, LineCamera, Pitot, TiltMount, camera_of, imu_noise, site_of
+from landsim.scene import believed_width, loading_of, runway_of, wind_of
+from landsim.sensors import Imu, LineCamera, Pitot, TiltMount, camera_of, site_of
 from landsim.truth import InitialState, Truth
 from landsim.units import DEG
-from landsim.versions import versions
 
 STANDSTILL = 0.05
 """Ground speed below which the aircraft stands, m/s."""
@@ -64,10 +65,11 @@ def draw_start(scenario: Scenario, rng: Generator) -> InitialState:
         speed=nominal + s.speed_sigma_mps * speed,
         heading=(s.heading_deg + s.heading_sigma_deg * heading) * DEG,
         flight_path=s.flight_path_deg * DEG,
+        wind=wind_of(scenario),
     )
 
 
-def fly(scenario: Scenario, seed: int = 0) -> Flight:
+def fly(scenario: Scenario, seed: int = 0, draws: Mapping[str, float] | None = None) -> Flight:
     """Fly a scenario once.
 
     Parameters
@@ -76,6 +78,9 @@ def fly(scenario: Scenario, seed: int = 0) -> Flight:
         Of the kind ``flight``.
     seed : int
         Not negative.  Everything random in the flight comes from it.
+    draws : mapping, optional
+        The values of the dispersed keys, as `landsim.dispersion.Design.draws` gives them; without them, those that the
+        seed gives by plain random sampling.
 
     Returns
     -------
@@ -84,24 +89,32 @@ def fly(scenario: Scenario, seed: int = 0) -> Flight:
     Raises
     ------
     InputError
-        If the aircraft's model does not load.
+        If the aircraft's model does not load, the scenario does not allow a drawn value, or a plug-in is not installed
+        or does not import.
     ValueError
         If the scenario is not a flight, or the seed is not a whole number of zero or more.
     """
     must_fly(scenario, seed)
     began = time.perf_counter()
+    draws = draws_of_seed(scenario, seed) if draws is None else draws
+    scenario = dispersed(scenario, draws)
     aircraft = scenario.aircraft_config
     recorder = Recorder(
-        camera_of(scenario.camera), scenario.runway.width_m, mount_of(aircraft.mount), aircraft.gear.main_wheels_body_m
+        camera_of(scenario.camera), believed_width(scenario), mount_of(aircraft.mount), aircraft.gear.main_wheels_body_m
     )
     seeds = SeedSequence(seed).spawn(5)
     start = draw_start(scenario, default_rng(seeds[0]))
+    traceback = None
     try:
-        end = _fly(scenario, start, seeds[1:], recorder)
+        end = _fly(scenario, start, seeds[1:], *on_board(scenario, seed), recorder)
     except InputError:
         raise
+    except PlugInFault as fault:
+        end = End("error", str(fault))
+        traceback = None if fault.__cause__ is None else traceback_of(fault.__cause__)
     except (StepError, ArithmeticError, ValueError) as error:  # LinAlgError is a ValueError
         end = End("error", f"{type(error).__name__}: {error}")
+        traceback = traceback_of(error)
     log = recorder.table()
     metrics = flight_metrics(
         log,
@@ -118,8 +131,10 @@ def fly(scenario: Scenario, seed: int = 0) -> Flight:
             "speed_mps": start.speed,
         },
         wall_time_s=time.perf_counter() - began,
-        versions=versions(),
+        versions=versions_of(scenario),
     )
+    metrics["traceback"] = traceback
+    metrics["draws"] = dict(draws)
     return Flight(metrics, log)
 
 
@@ -138,7 +153,14 @@ class End(NamedTuple):
     detail: str = ""
 
 
-def _fly(scenario: Scenario, start: InitialState, seeds: Sequence[SeedSequence], recorder: Recorder) -> End:
+def _fly(
+    scenario: Scenario,
+    start: InitialState,
+    seeds: Sequence[SeedSequence],
+    estimator: EstimatorSetup,
+    controller: ControllerSetup,
+    recorder: Recorder,
+) -> End:
     """The loop; says why it ended."""
     aircraft, settings = scenario.aircraft_config, scenario.simulation
     dt = 1.0 / settings.rate_hz
@@ -150,7 +172,7 @@ def _fly(scenario: Scenario, start: InitialState, seeds: Sequence[SeedSequence],
     imu_rng, pitot_rng, mount_rng, camera_rng = (default_rng(seed) for seed in seeds)
     runway = runway_of(scenario)
     site = site_of(runway)
-    plant = Plant(aircraft.folder, aircraft.model, runway, settings.rate_hz)
+    plant = Plant(aircraft.folder, aircraft.model, runway, settings.rate_hz, loading_of(scenario))
     wheels = aircraft.gear.main_wheels_body_m
     height = -start.position[2]
     if height < wheels[2]:
@@ -162,23 +184,11 @@ def _fly(scenario: Scenario, start: InitialState, seeds: Sequence[SeedSequence],
 
     imu = Imu(scenario.imu, site, truth, imu_rng)
     pitot = Pitot(scenario.pitot, dt, truth, pitot_rng)
-    mount = TiltMount(aircraft.mount, dt, mount_rng)
+    mount = TiltMount(aircraft.mount, dt, mount_rng, scenario.camera.tilt_error_deg * DEG)
     camera = LineCamera(scenario.camera, aircraft.mount.position_body_m, runway, camera_rng)
-    navigator = Navigator(
-        camera.camera,
-        scenario.camera.noise_px,
-        runway.width,
-        site,
-        imu_noise(scenario.imu),
-        imu_dt,
-        mount_of(aircraft.mount),
-        scenario.navigation,
-        incidence_of(aircraft),
-    )
-    half_view = math.atan((camera.camera.height - 0.5 - camera.camera.cy) / camera.camera.fy)
-    law = law_of(aircraft, scenario.approach, site.gravity, half_view, frame_every * dt)
-    guidance = INITIAL
-    command, _ = guide(law, navigator.state(0.0), guidance)
+    navigator = estimator_of(scenario.plug_ins.estimator, estimator)
+    guidance = controller_of(scenario.plug_ins.controller, controller)
+    command, phase = guidance.guide(navigator.state(0.0))
     plant.command(command)
 
     rate, side_force = _ZERO, 0.0
@@ -200,9 +210,9 @@ def _fly(scenario: Scenario, start: InitialState, seeds: Sequence[SeedSequence],
             result = navigator.observe(view.frame)
             recorder.frame(view, result, navigator.filter, imu)
             diverged = navigator.diverged
-            command, guidance = guide(law, navigator.state(truth.time), guidance)
+            command, phase = guidance.guide(navigator.state(truth.time))
             plant.command(command)
-        recorder.step(truth, navigator, command, guidance.phase, airspeed, mount.tilt, tilt_reading)
+        recorder.step(truth, navigator, command, phase, airspeed, mount.tilt, tilt_reading)
         if diverged is not None:
             return End("diverged", diverged)
         if truth.wow_nose or truth.wow_left or truth.wow_right:
@@ -220,7 +230,7 @@ def _fly(scenario: Scenario, start: InitialState, seeds: Sequence[SeedSequence],
         plant.feed(rate, side_force, roll, pitch, navigator.airspeed)
         truth = plant.step()
         if truth.structure_contact or not -truth.motion[2] > BELOW_GROUND:  # the latter catches NaN
-            return _crash(recorder, truth, navigator, command, guidance.phase, airspeed, mount.tilt, tilt_reading)
+            return _crash(recorder, truth, navigator, command, phase, airspeed, mount.tilt, tilt_reading)
     return End("timeout")
 
 

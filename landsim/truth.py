@@ -10,16 +10,30 @@ from estimator.strapdown import inertial
 
 
 class InitialState(NamedTuple):
-    """Where a flight begins, in trim, wings level."""
+    """Where a flight begins, in trim, wings level, the nose into the wind that it feels."""
 
     position: Vec3
     """Centre of gravity, runway frame, m."""
     speed: float
     """True airspeed, m/s."""
     heading: float
-    """Heading and track relative to the runway's, rad, nose right positive (calm air)."""
+    """Of the track over the ground relative to the runway's, rad, right positive; in calm air that of the nose too."""
     flight_path: float
-    """Flight-path angle, rad, climb positive."""
+    """Flight-path angle over the ground, rad, climb positive."""
+    wind: Vec3 = (0.0, 0.0, 0.0)
+    """Velocity of the air, runway frame, m/s: steady, the same everywhere."""
+
+
+class Loading(NamedTuple):
+    """How an aircraft's mass differs from the nominal one."""
+
+    extra_mass: float = 0.0
+    """At the nominal centre of gravity, kg."""
+    cg_forward: float = 0.0
+    """Of the centre of gravity from its nominal place, m."""
+
+
+NOMINAL = Loading()
 
 
 class Truth(NamedTuple):
@@ -28,7 +42,10 @@ class Truth(NamedTuple):
     time: float
     """s since the start."""
     motion: Array
-    """(15,): position, velocity and attitude, as `estimator.strapdown.Inertial.numbers` begins; never written to."""
+    """(15,): position, velocity and attitude, as `estimator.strapdown.Inertial.numbers` begins; never written to.
+
+    They are those of the body's origin, which is the centre of gravity of the aircraft as it is nominally loaded.
+    """
     airspeed: float
     """True airspeed, m/s."""
     wow_nose: bool
@@ -50,7 +67,7 @@ class Truth(NamedTuple):
 
     @property
     def position(self) -> Vec3:
-        """Centre of gravity, runway frame, m."""
+        """Nominal centre of gravity, runway frame, m."""
         return inertial(self.motion).position
 
     @property

@@ -23,14 +23,16 @@ from landsim.config import (
     resolved_toml,
 )
 from landsim.resources import find_scenario, shipped_aircraft, shipped_scenarios
-from landsim.schema import Section, rows
+from landsim.schema import Section, fields_by_key, rows
 
+PLUG_IN_SETTINGS = {"plug-ins.estimator_settings", "plug-ins.controller_settings"}
 MINIMAL = 'kind = "flight"\naircraft.name = "pioneer"\n'
 
 
 def settings_of(scenario: ScenarioFile) -> dict[str, object]:
     """Everything that a file says: dotted key to value."""
-    return {key: value for key in ScenarioFile.model_fields for key, value in _rows(key, getattr(scenario, key))}
+    fields = fields_by_key(ScenarioFile).items()
+    return {key: value for name, field in fields for key, value in _rows(name, getattr(scenario, field))}
 
 
 def _rows(key: str, value: object) -> list[tuple[str, object]]:
@@ -63,9 +65,10 @@ class TestShipped:
         with shipped_scenarios()["landing"].open("rb") as file:
             written = keys_of(tomllib.load(file))
         loaded = load_scenario("landing")
-        assert set(settings_of(loaded)) - written == {"start.speed_mps", "study"}  # TOML cannot say "none"
+        # TOML cannot say "none"
+        assert set(settings_of(loaded)) - written == {"start.speed_mps", "study", "dispersions", *PLUG_IN_SETTINGS}
         for key in ScenarioFile.model_fields:
-            if key not in {"kind", "aircraft", "study"}:
+            if key not in {"kind", "aircraft", "study", "dispersions"}:
                 section = getattr(loaded, key)
                 assert section == type(section)()
 
@@ -147,7 +150,7 @@ class TestOverrides:
 REFUSED: list[tuple[str, object, str]] = [
     ("runway.widht_m", 30.0, "override runway.widht_m: unknown key; did you mean runway.width_m?"),
     ("camra.rate_hz", 30.0, "override camra: unknown key; did you mean camera?"),
-    ("camera.zzz", 1, "override camera.zzz: unknown key; known: focal_length_mm, pixel_um, width_px"),
+    ("camera.zzz", 1, "override camera.zzz: unknown key; known: focal_length_mm, focal_length_error, "),
     ("runway.width_m", -30.0, "override runway.width_m: must be above 0, not -30.0"),
     ("runway.width_m", 0, "override runway.width_m: must be above 0, not 0"),
     ("runway.width_m", float("nan"), "override runway.width_m: must be a finite number, not nan"),
@@ -172,8 +175,8 @@ REFUSED: list[tuple[str, object, str]] = [
     ),
     ("camera.outages_s", [[2.0, 1.0]], "override camera.outages_s: each window must be [from, to]"),
     ("camera.outages_s", [[1.0, 3.0], [2.0, 4.0]], "override camera.outages_s: windows must follow each other"),
-    ("camera.outages_s", [[1.0]], "override camera.outages_s.0: element 2 is missing"),
-    ("camera.outages_s", [[1.0, 2.0, 3.0]], "override camera.outages_s.0: must have 2 elements, not 3"),
+    ("camera.outages_s", [[1.0]], "override camera.outages_s[0]: element 2 is missing"),
+    ("camera.outages_s", [[1.0, 2.0, 3.0]], "override camera.outages_s[0]: must have 2 elements, not 3"),
     ("camera.rate_hz", 50.0, "override camera.rate_hz: must divide simulation.rate_hz = 120; 50 does not"),
     ("imu.rate_hz", 240.0, "override imu.rate_hz: must divide simulation.rate_hz = 120; 240 does not"),
     ("approach.glide_slope_deg", 15.0, "override approach.glide_slope_deg: must be below 15, not 15.0"),
@@ -195,7 +198,7 @@ REFUSED_STUDY: list[tuple[str, object, str]] = [
     ("study.bounds.cros_m", 1.0, "override study.bounds.cros_m: unknown key; did you mean study.bounds.cross_m?"),
     ("study.ranges_m", [100.0, 100.0], "override study.ranges_m: must fall from each to the next, not [100.0, 100.0]"),
     ("study.ranges_m", [], "override study.ranges_m: must have at least 1 element, not 0"),
-    ("study.readings", ["corner"], 'override study.readings.0: must be "endpoints" or "edge-points", not "corner"'),
+    ("study.readings", ["corner"], 'override study.readings[0]: must be "endpoints" or "edge-points", not "corner"'),
     ("study.draws", 99, "override study.draws: must be at least 100, not 99"),
     ("study.bounds.yaw_deg", 0.0, "override study.bounds.yaw_deg: must be above 0, not 0.0"),
     ("study.stage", "midle", 'override study.stage: must be "early", "late" or "both", not "midle"'),
@@ -317,8 +320,12 @@ class TestRoundTrip:
     @pytest.mark.parametrize(
         ("name", "overrides", "none"),
         [
-            ("landing", {"start.speed_mps": 39.0}, {"study"}),
-            ("paper-fig3", {}, {f"study.bounds_late.{key}" for key in BoundsConfig.model_fields}),
+            ("landing", {"start.speed_mps": 39.0}, {"study", "dispersions", *PLUG_IN_SETTINGS}),
+            (
+                "paper-fig3",
+                {},
+                {f"study.bounds_late.{key}" for key in BoundsConfig.model_fields} | {"dispersions", *PLUG_IN_SETTINGS},
+            ),
         ],
     )
     def test_resolved_says_every_key(self, name: str, overrides: dict[str, object], none: set[str]) -> None:

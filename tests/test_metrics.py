@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from synthetic import empty_log, flight_log, parts
 
 from landsim import metrics
+from landsim.log import QUANTITIES
 from landsim.metrics import Log
 
 SCENARIO, AIRCRAFT = parts()
@@ -277,6 +278,22 @@ def test_consistency_by_phase() -> None:
         "coasting": {"nees9_mean": 7.0, "nees15_mean": 14.0, "frames": 1, "rejected": 0},
         "rollout": {"nees9_mean": 25.0, "nees15_mean": 50.0, "frames": 2, "rejected": 1},
     }
+
+
+def test_coverage_counts_the_frames_in_the_air_within_the_predicted_95_percent() -> None:
+    """Five frames, two of them on the ground; rows that are no frames do not count."""
+    log = landing()
+    log["nees9"][:] = np.nan
+    log["nees9"][[0, 4, 8, 12, 16]] = 9.0
+    log["sigma_cross_m"][:], log["sigma_yaw_deg"][:] = 2.0, 1.0
+    log["fused_cross_m"] = log["true_cross_m"] + 100.0
+    log["fused_cross_m"][[0, 4, 8]] = log["true_cross_m"][[0, 4, 8]] + [3.91, -3.93, 0.0]  # 1.96 σ are 3.92 m
+    log["true_yaw_deg"][:] = 359.0
+    log["fused_yaw_deg"][:] = 0.5
+    found = measured(log)["coverage"]
+    assert (found["frames"], found["cross_m"], found["yaw_deg"]) == (3, pytest.approx(2.0 / 3.0), 1.0)
+    log["nees9"][:] = np.nan
+    assert measured(log)["coverage"] == {"frames": 0} | dict.fromkeys(QUANTITIES)
 
 
 @pytest.mark.parametrize("rows", [0, 1, 2])

@@ -1,6 +1,7 @@
 """landsim/plant.py: frames, truth, the ground, errors."""
 
 import math
+import re
 import shutil
 from collections.abc import Callable
 from itertools import pairwise
@@ -10,16 +11,16 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 
-from estimator.so3 import from_euler, matmul, rotate, rotate_back, to_euler
+from estimator.so3 import Vec3, from_euler, matmul, rotate, rotate_back, to_euler
 from landsim import earth
 from landsim.config import ImuConfig
 from landsim.errors import InputError
-from landsim.plant import Plant, PlantError, TrimError, load, node
+from landsim.plant import Plant, PlantError, TrimError, TrimPoint, load, node
 from landsim.resources import find_aircraft
 from landsim.runway import Runway
 from landsim.sensors import Imu, site_of
 from landsim.state import Command
-from landsim.truth import InitialState, Truth
+from landsim.truth import NOMINAL, InitialState, Loading, Truth
 from landsim.units import DEG, FT, STANDARD_GRAVITY
 
 FOLDER = find_aircraft("pioneer")[1]
@@ -216,6 +217,123 @@ def test_same_inputs_same_bits() -> None:
     assert any(truth.wow_left for truth in flights[0])
     one, other = ([np.array((*t[:1], *t.motion, *t[2:])) for t in flown] for flown in flights)
     assert np.array_equal(one, other)
+
+
+# --- wind and loading -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("runway", RUNWAYS)
+@pytest.mark.parametrize("wind", [(-5.0, 3.0, 0.0), (4.0, -6.0, 0.0), (0.0, 8.0, 0.0), (-12.0, 0.0, 0.0)])
+def test_it_starts_in_the_wind_at_its_airspeed_along_its_track(runway: Runway, wind: Vec3) -> None:
+    """The ground's velocity less the wind's is the air's: as long as the airspeed, and where the nose points."""
+    plant, truth = started(runway, START._replace(wind=wind, position=(-1000.0, 5.0, -300.0)))
+    assert truth.position == pytest.approx((-1000.0, 5.0, -300.0), abs=2e-4)
+    assert truth.airspeed == pytest.approx(START.speed, abs=1e-3)
+    vx, vy, vz = truth.velocity
+    assert math.atan2(vy, vx) == pytest.approx(START.heading, abs=2e-5)
+    assert math.atan2(-vz, math.hypot(vx, vy)) == pytest.approx(START.flight_path, abs=1e-4)
+    through_air = (vx - wind[0], vy - wind[1], vz - wind[2])
+    assert math.hypot(*through_air) == pytest.approx(START.speed, abs=2e-3)
+    roll, _, yaw = to_euler(truth.R_runway_from_body)
+    assert yaw == pytest.approx(math.atan2(through_air[1], through_air[0]), abs=0.01 * DEG)
+    assert roll == pytest.approx(0.0, abs=0.05 * DEG)
+    blows = rotate(runway.R_runway_from_ned_at(runway.latitude, runway.longitude), ned(plant, "atmosphere/wind-{}-fps"))
+    assert blows == pytest.approx(wind, abs=2e-3)  # north turns by 1e-4 rad over the kilometre
+    for _ in range(240):
+        truth = plant.step()
+    assert truth.velocity == pytest.approx((vx, vy, vz), abs=0.05)
+    assert truth.airspeed == pytest.approx(START.speed, abs=0.03)
+
+
+def ned(plant: Plant, name: str) -> Vec3:
+    north, east, down = (FT * read(plant, name.format(axis)) for axis in ("north", "east", "down"))
+    return north, east, down
+
+
+def test_a_head_wind_slows_it_over_the_ground_and_a_cross_wind_turns_its_nose() -> None:
+    level = InitialState((-1000.0, 0.0, -60.0), 40.0, 0.0, 0.0)
+    assert started(PLAIN, level._replace(wind=(-5.0, 0.0, 0.0)))[1].velocity[0] == pytest.approx(35.0, abs=1e-4)
+    _, truth = started(PLAIN, level._replace(wind=(0.0, 8.0, 0.0)))  # from the left: the nose goes left
+    assert truth.velocity[0] == pytest.approx(math.sqrt(40.0**2 - 8.0**2), abs=1e-3)
+    assert to_euler(truth.R_runway_from_body)[2] == pytest.approx(-math.asin(0.2), abs=0.01 * DEG)
+
+
+@pytest.mark.parametrize("wind", [(-41.0, 0.0, 0.0), (0.0, 40.5, 0.0)])
+def test_a_wind_that_is_faster_than_the_aircraft_is_no_start(wind: Vec3) -> None:
+    with pytest.raises(TrimError, match=r"at 40\.0 m/s through the air it makes no way against a wind of 4\d\.\d m/s"):
+        started(PLAIN, START._replace(heading=0.0, flight_path=0.0, wind=wind))
+
+
+@pytest.mark.parametrize(("extra", "forward"), [(20.0, 0.0), (-25.0, 0.0), (0.0, 0.05), (15.0, -0.04)])
+def test_mass_and_centre_of_gravity_are_what_was_asked_for(extra: float, forward: float) -> None:
+    """Of JSBSim's own mass balance; the aircraft weighs 420 lb, and its centre of gravity lies at 60 in."""
+    plant = Plant(FOLDER, "pioneer", PLAIN, RATE, Loading(extra, forward))
+    plant.start(START)
+    assert read(plant, "inertia/mass-slugs") * 14.593903 == pytest.approx(420.0 * 0.45359237 + extra, abs=1e-4)
+    assert read(plant, "inertia/cg-x-in") == pytest.approx(60.0 - forward / 0.0254, abs=1e-9)
+    assert [read(plant, f"inertia/cg-{axis}-in") for axis in "yz"] == [0.0, 0.0]
+    # to first order the moments of inertia stay
+    for axis, nominal in (("xx", 34.832), ("yy", 67.08), ("zz", 82.22)):
+        assert read(plant, f"inertia/i{axis}-slugs_ft2") == pytest.approx(nominal, rel=0.01)
+
+
+def trimmed(loading: Loading) -> TrimPoint:
+    plant = Plant(FOLDER, "pioneer", PLAIN, RATE, loading)
+    plant.start(InitialState((-1000.0, 0.0, -60.0), 40.0, 0.0, 0.0))
+    return plant.trim
+
+
+def test_trim_knows_the_loading() -> None:
+    """Weight is carried by lift, and a centre of gravity further ahead by the tail.
+
+    A tenth more weight asks for so much more lift coefficient, W / (q S).  By Bray's table 4.7 a degree of incidence
+    gives 0.094 between 2° and 3°, and by table 4.4 a degree of elevator 0.0062, which goes up a degree with each degree
+    of incidence (the trim table in the aircraft's README).
+    """
+    nominal = trimmed(NOMINAL)
+    pressure = 0.5 * 1.2181 * 40.0**2 * 30.42 * 0.3048**2  # q S, at 60 m in the standard atmosphere
+    weight = 420.0 * 4.4482216
+    heavier = trimmed(Loading(extra_mass=0.1 * weight / 9.80665))
+    assert (heavier.alpha - nominal.alpha) / DEG == pytest.approx(0.1 * weight / pressure / (0.094 - 0.0062), rel=0.05)
+    ahead, behind = trimmed(Loading(cg_forward=0.03)), trimmed(Loading(cg_forward=-0.03))
+    assert ahead.elevator < nominal.elevator - 0.5 * DEG
+    assert behind.elevator > nominal.elevator + 0.5 * DEG
+
+
+@pytest.mark.parametrize("forward", [0.0, 0.05, -0.08])
+def test_truth_stays_with_the_airframe_when_the_centre_of_gravity_does_not(forward: float) -> None:
+    """The wheels of aircraft.toml are as high as JSBSim says, and what moves there moves as the position does."""
+    plant = Plant(FOLDER, "pioneer", FAR, RATE, Loading(0.0, forward))
+    truth = plant.start(START._replace(position=(-30.0, 0.0, -12.0)))
+    flown = fly(plant, truth, 2.0, weave)
+    for number, wheel in {0: (1.2192, 0.0, 0.8382), 1: (-0.2794, -0.762, 0.8382)}.items():
+        height = -(flown[-1].position[2] + rotate(flown[-1].R_runway_from_body, wheel)[2])
+        assert read(plant, f"gear/unit[{number}]/AGL-ft") * FT == pytest.approx(height, abs=2e-3)
+    for before, now, after in zip(flown[120:], flown[121:], flown[122:], strict=False):
+        moved = [0.5 * RATE * (b - a) for a, b in zip(before.position, after.position, strict=True)]
+        assert moved == pytest.approx(now.velocity, abs=1e-4)
+
+
+def test_more_than_all_of_its_mass_cannot_be_taken_away() -> None:
+    with pytest.raises(TrimError, match=r"no mass is left: 190\.5 kg and -200\.0 kg"):
+        Plant(FOLDER, "pioneer", PLAIN, RATE, Loading(extra_mass=-200.0)).start(START)
+
+
+def test_a_model_without_point_masses_flies_at_its_nominal_mass_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "copy"
+    shutil.copytree(FOLDER, folder)
+    text = (folder / "pioneer.xml").read_text(encoding="utf-8")
+    bare = re.sub(r"<pointmass.*?</pointmass>", "", text, flags=re.DOTALL)
+    assert bare != text
+    (folder / "pioneer.xml").write_text(bare, encoding="utf-8")
+    with pytest.raises(
+        PlantError, match=r"pioneer\.xml: the model cannot be loaded with another mass .* three <pointmass>"
+    ):
+        Plant(folder, "pioneer", PLAIN, RATE, Loading(cg_forward=0.01))
+    one = Plant(folder, "pioneer", PLAIN, RATE)
+    other, truth = started()
+    assert np.array_equal(one.start(START).motion, truth.motion)
+    assert one.trim == other.trim
 
 
 # --- the ground -------------------------------------------------------------------------------------------------------

@@ -9,10 +9,11 @@ import pytest
 from numpy.random import default_rng
 from scipy.spatial.transform import Rotation
 
+from estimator.lines import fit_line
 from estimator.so3 import Vec3, flat
 from landsim.config import CameraConfig, ImuConfig, MountConfig, PitotConfig
 from landsim.runway import Runway
-from landsim.sensors import Imu, LineCamera, Pitot, TiltMount, imu_noise, site_of
+from landsim.sensors import Imu, LineCamera, Pitot, TiltMount, _fitted, imu_noise, site_of
 from landsim.truth import Truth
 
 RUNWAY = Runway(length=2000.0, width=30.0, latitude=math.radians(45.0))
@@ -38,14 +39,14 @@ def camera(**changes: object) -> LineCamera:
     return LineCamera(CameraConfig.model_validate({"noise_px": 0.0, **changes}), LEVER, RUNWAY, default_rng(0))
 
 
-def opencv_pixel(truth: Truth, tilt: float, point: Vec3) -> np.ndarray:
+def opencv_pixel(truth: Truth, tilt: float, point: Vec3, focal_length: float = F) -> np.ndarray:
     """A point of the runway frame by cv2.projectPoints, with rotations built by scipy."""
     R_runway_from_body = np.array(truth.R_runway_from_body).reshape(3, 3)
     R_body_from_triad = Rotation.from_euler("y", -tilt).as_matrix()
     R_triad_from_cam = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     R_cam_from_runway = (R_runway_from_body @ R_body_from_triad @ R_triad_from_cam).T
     centre = np.array(truth.position) + R_runway_from_body @ np.array(LEVER)
-    matrix = np.array([[F, 0.0, 328.5], [0.0, F, 246.5], [0.0, 0.0, 1.0]])
+    matrix = np.array([[focal_length, 0.0, 328.5], [0.0, focal_length, 246.5], [0.0, 0.0, 1.0]])
     rotation = cv2.Rodrigues(R_cam_from_runway)[0]
     pixels, _ = cv2.projectPoints(np.array([point]), rotation, -R_cam_from_runway @ centre, matrix, None)
     return np.asarray(pixels).reshape(2)
@@ -149,6 +150,89 @@ def test_noise_of_a_line_is_that_of_its_points(line_noise: str) -> None:
     assert readings[:, 0].std() == pytest.approx(1.5 / math.sqrt(number), rel=0.05)
     assert readings[:, 1].std() == pytest.approx(1.5 / math.sqrt(lever), rel=0.05)
     assert abs(readings[:, 0].mean()) < 4.0 * 1.5 / math.sqrt(number * 4000)
+
+
+@pytest.mark.parametrize("numbers", [(2, 2, 2), (37, 0, 5), (400, 61, 333)])
+def test_fitted_lines_are_those_of_their_points(numbers: tuple[int, ...]) -> None:
+    """The compiled moments against `estimator.lines.fit_line` on the points themselves, made one by one."""
+    rng, sigma = default_rng(sum(numbers)), 1.7
+    ends = rng.uniform(0.0, 600.0, (3, 4))
+    noise = rng.standard_normal(2 * sum(numbers))
+    readings, seen = _fitted(ends, np.array(numbers), noise, sigma)
+    across, down = noise.reshape(2, -1)
+    first = 0
+    for line, number in enumerate(numbers):
+        if number == 0:
+            assert np.isnan(readings[line]).all()
+            assert np.isnan(seen[line]).all()
+            continue
+        begin, end = ends[line, :2], ends[line, 2:]
+        middle, step = (begin + end) / 2.0, (end - begin) / (number - 1)
+        places = np.arange(number) - (number - 1) / 2.0
+        errors = np.stack((across[first : first + number], down[first : first + number]), axis=1)
+        first += number
+        fit = fit_line(middle + places[:, None] * step + sigma * errors)
+        expected = (*fit.line, *fit.centroid, float(fit.spread), fit.points)
+        sign = 1.0 if readings[line, :2] @ fit.line[:2] > 0.0 else -1.0
+        np.testing.assert_allclose(readings[line] * (sign, sign, sign, 1.0, 1.0, 1.0, 1.0), expected, rtol=1e-9)
+        for end_seen, end_true in zip(seen[line].reshape(2, 2), (begin, end), strict=True):
+            off = fit.line[:2] @ end_true + fit.line[2]  # moved across the line onto it
+            np.testing.assert_allclose(end_seen, end_true - off * fit.line[:2], rtol=1e-9)
+
+
+def test_lens_and_mount_have_errors_that_navigation_is_not_told_of() -> None:
+    """A lens that is 2 % longer and an axis that lies 0.4° lower than the mount says, by OpenCV's projection."""
+    truth = truth_at((-600.0, 7.0, -35.0), (2.0, -1.0, 5.0))
+    device = camera(focal_length_error=0.02)
+    config = MountConfig(position_body_m=LEVER, tilt_rate_deg_s=10.0, tilt_reading_sigma_deg=0.0)
+    mount = TiltMount(config, 0.1, default_rng(0), math.radians(0.4))
+    assert mount.read() == math.radians(3.0)
+    view = device.view(truth, mount.tilt, mount.read())
+    expected = [opencv_pixel(truth, math.radians(3.4), (0.0, y, 0.0), 1.02 * F) for y in (-15.0, 15.0)]
+    np.testing.assert_allclose(view.true_ends[1], np.concatenate(expected), atol=1e-6)
+    assert view.frame.tilt == math.radians(3.0)
+    assert device.camera.intrinsics[:2] == pytest.approx((F, F))
+    for _ in range(8):
+        mount.move(math.radians(10.0))
+    assert mount.read() == math.radians(10.0)
+    assert mount.tilt == pytest.approx(math.radians(10.4))
+
+
+def test_points_are_noisier_by_the_factor() -> None:
+    """The offset of a line through N points has σ²/N."""
+    truth = truth_at((-300.0, 0.0, -18.0))
+    device = camera(noise_px=0.5, noise_factor=3.0)
+    offsets, points = [], 0.0
+    for _ in range(2000):
+        view = device.view(truth, 0.0, 0.0)
+        reading = view.frame.reading(1)
+        assert reading is not None
+        u0, v0, u1, v1 = view.true_ends[1]
+        offsets.append((reading.a * (u0 + u1) + reading.b * (v0 + v1)) / 2.0 + reading.c)
+        points = reading.points
+    assert np.std(offsets) == pytest.approx(1.5 / math.sqrt(points), rel=0.07)
+
+
+def test_imu_errors_grow_by_their_factor() -> None:
+    """With the same random numbers, each error is three times as large: bias, drift, white noise and scale factor."""
+    states = [
+        truth_at((40.0 * t, 0.0, -10.0), (3.0 * t, 2.0 * t, -5.0 * t), (40.0 + t, t, 0.5 * t)) for t in (0.0, 0.1)
+    ]
+    config, site = ImuConfig(), site_of(RUNWAY)
+    perfect = ImuConfig.model_validate(dict.fromkeys((k for k in ImuConfig.model_fields if k != "rate_hz"), 0.0))
+    one, three, ideal = (
+        Imu(c, site, states[0], default_rng(5)).sample(states[1])
+        for c in (config, ImuConfig.model_validate({"error_factor": 3.0}), perfect)
+    )
+    np.testing.assert_allclose(three - ideal, 3.0 * (one - ideal), rtol=1e-7)
+    assert np.abs(one - ideal).min() > 0.0
+    assert imu_noise(ImuConfig.model_validate({"error_factor": 3.0})) == imu_noise(config)
+
+
+def test_pitot_reads_too_much_by_its_error_of_scale() -> None:
+    fast = truth_at(airspeed=40.0)
+    tube = Pitot(PitotConfig(noise_mps=0.0, scale_error=0.03), 0.01, fast, default_rng(0))
+    assert tube.sample(fast) == pytest.approx(41.2)
 
 
 def test_imu_at_rest_feels_gravity_and_the_turning_earth() -> None:

@@ -1,0 +1,113 @@
+"""The approach and what it is flown over and through: aircraft, runway, wind, loading, start, simulation, box."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from landsim.schema.base import HeadingDeg, NotNegative, Positive, Section, refused
+
+
+class AircraftChoice(Section):
+    """``[aircraft]``: which aircraft flies."""
+
+    name: Annotated[str, Field(min_length=1)]
+    """Name of a shipped aircraft, or path of a folder that holds aircraft.toml, relative to the scenario file."""
+
+
+class RunwayConfig(Section):
+    """``[runway]``: a flat, straight runway on the WGS 84 ellipsoid."""
+
+    width_m: Annotated[float, Field(gt=0.0, le=1000.0)] = 30.0
+    """Between the painted edges."""
+    width_error_m: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0
+    """What navigation takes for the width, less the width."""
+    length_m: Annotated[float, Field(gt=0.0, le=1e5)] = 2000.0
+    heading_deg: HeadingDeg = 0.0
+    """True heading of the landing direction."""
+    latitude_deg: Annotated[float, Field(ge=-89.0, le=89.0)] = 0.0
+    """Geodetic, of the middle of the threshold.  North is not a direction to fly by nearer to a pole."""
+    longitude_deg: Annotated[float, Field(ge=-180.0, le=180.0)] = 0.0
+    elevation_m: Annotated[float, Field(ge=-500.0, le=6000.0)] = 0.0
+    """Of the threshold above the ellipsoid."""
+
+    @model_validator(mode="after")
+    def _believed_width(self) -> Self:
+        if not self.width_m + self.width_error_m > 0.0:
+            raise refused(f"must be above -width_m = {-self.width_m:g}, not {self.width_error_m:g}", "width_error_m")
+        return self
+
+
+class ApproachConfig(Section):
+    """``[approach]``: the line to fly."""
+
+    glide_slope_deg: Annotated[float, Field(gt=0.0, lt=15.0)] = 3.0
+    aim_point_m: NotNegative = 145.0
+    """Where the glide slope meets the runway, past the threshold."""
+
+
+class StartConfig(Section):
+    """``[start]``: the centre of gravity at the start, and the σ of what each seed adds, unknown to navigation."""
+
+    along_m: Annotated[float, Field(lt=0.0, ge=-1e5)] = -1000.0
+    """From the threshold, negative before it."""
+    cross_m: Annotated[float, Field(ge=-1e5, le=1e5)] = 0.0
+    """Right of the centreline."""
+    height_m: Positive = 60.0
+    """Above the threshold."""
+    heading_deg: Annotated[float, Field(ge=-90.0, le=90.0)] = 0.0
+    """Of the track over the ground, relative to the runway's, nose right positive; in a wind the nose points off it."""
+    flight_path_deg: Annotated[float, Field(ge=-15.0, le=15.0)] = -3.0
+    """Over the ground."""
+    speed_mps: Positive | None = None
+    """Airspeed; without it, the aircraft's approach speed."""
+    cross_sigma_m: NotNegative = 8.0
+    height_sigma_m: NotNegative = 4.0
+    heading_sigma_deg: NotNegative = 2.0
+    speed_sigma_mps: NotNegative = 1.0
+
+
+class WindConfig(Section):
+    """``[wind]``: a steady wind, the same everywhere, down to the ground; nobody on board is told of it."""
+
+    head_mps: Annotated[float, Field(ge=-100.0, le=100.0)] = 0.0
+    """Against the landing direction; a tail wind is negative."""
+    cross_mps: Annotated[float, Field(ge=-100.0, le=100.0)] = 0.0
+    """Towards the right, as ``cross_m`` is: from the left."""
+
+
+class LoadingConfig(Section):
+    """``[loading]``: what the aircraft carries besides its nominal mass; guidance's gains are not told of it."""
+
+    extra_mass_kg: Annotated[float, Field(ge=-1e5, le=1e5)] = 0.0
+    """At the nominal centre of gravity, so that the moments of inertia stay; negative for what is left at home."""
+    cg_forward_m: Annotated[float, Field(ge=-10.0, le=10.0)] = 0.0
+    """Of the nominal centre of gravity, by ballast that is moved along the fuselage."""
+
+
+class SimulationConfig(Section):
+    """``[simulation]``: the plant's step and the longest flight."""
+
+    rate_hz: Annotated[float, Field(ge=20.0, le=10000.0)] = 120.0
+    """``imu.rate_hz`` must divide it, and ``camera.rate_hz`` must divide both."""
+    time_limit_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 120.0
+    end: Literal["stop", "touchdown"] = "stop"
+    """Where a flight ends: at the stop, or at the touchdown, where what comes after is of no interest."""
+
+
+class BoxConfig(Section):
+    """``[box]``: what a good landing is.  It judges, and does not steer."""
+
+    along_min_m: float = 100.0
+    """Touchdown, past the threshold."""
+    along_max_m: float = 450.0
+    cross_max_m: NotNegative = 2.0
+    """Touchdown, either side of the centreline."""
+    sink_max_mps: NotNegative = 1.0
+    bank_max_deg: NotNegative = 3.0
+    stop_cross_max_m: NotNegative = 3.0
+
+    @model_validator(mode="after")
+    def _along_in_order(self) -> Self:
+        if not self.along_min_m < self.along_max_m:
+            raise refused(f"must be above along_min_m = {self.along_min_m:g}, not {self.along_max_m:g}", "along_max_m")
+        return self

@@ -1,0 +1,103 @@
+"""The sensors, and what navigation makes of them."""
+
+from itertools import pairwise
+from typing import Annotated, Literal, Self
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from landsim.schema.base import LARGEST, NotNegative, Positive, Section, WindowS, refused, tuple_from_list
+
+
+class CameraConfig(Section):
+    """``[camera]``: lens, image and the noise of the lines."""
+
+    focal_length_mm: Positive = 12.5
+    """As calibrated."""
+    focal_length_error: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
+    """By this share the lens is longer than navigation takes it for."""
+    tilt_error_deg: Annotated[float, Field(ge=-45.0, le=45.0)] = 0.0
+    """By so much the optical axis lies lower than the mount's angle says; not known to navigation."""
+    pixel_um: Annotated[float, Field(ge=0.01, le=LARGEST)] = 9.9
+    width_px: Annotated[int, Field(ge=16, le=20000)] = 658
+    height_px: Annotated[int, Field(ge=16, le=20000)] = 494
+    rate_hz: Annotated[float, Field(ge=0.1, le=10000.0)] = 30.0
+    line_noise: Literal["edge-points", "endpoints"] = "edge-points"
+    """What is noisy: every point along a line, or only the two ends of what is seen of it."""
+    noise_px: NotNegative = 2.0**0.5
+    """1 σ of each noisy point, in u and in v, as navigation believes it."""
+    noise_factor: Annotated[float, Field(ge=0.0, le=100.0)] = 1.0
+    """By which the points' noise is greater than that."""
+    point_spacing_px: Annotated[float, Field(ge=0.1, le=LARGEST)] = 1.0
+    """Between the points along a line, with ``edge-points``."""
+    min_line_px: Annotated[float, Field(ge=2.0)] = 8.0
+    """A shorter line is not reported."""
+    near_m: Positive = 1.0
+    """Depth of the near plane."""
+    outages_s: Annotated[tuple[WindowS, ...], BeforeValidator(tuple_from_list)] = ()
+    """Windows [from, to] of time in which no line is reported."""
+
+    @model_validator(mode="after")
+    def _outages_in_order(self) -> Self:
+        for start, end in self.outages_s:
+            if not start < end:
+                raise refused(f"each window must be [from, to] with from < to, not [{start:g}, {end:g}]", "outages_s")
+        for (_, end), (start, _) in pairwise(self.outages_s):
+            if start < end:
+                raise refused(f"windows must follow each other: one begins at {start:g}, before {end:g}", "outages_s")
+        return self
+
+
+class ImuConfig(Section):
+    """``[imu]``: the one inertial unit; 1 σ each, drawn per seed and axis; a drift is a random walk."""
+
+    rate_hz: Annotated[float, Field(ge=1.0, le=10000.0)] = 120.0
+    gyro_bias_deg_h: NotNegative = 10.0
+    gyro_bias_drift_deg_h_sqrt_h: NotNegative = 3.0
+    """deg/h after one hour."""
+    gyro_noise_deg_sqrt_h: NotNegative = 0.1
+    """Angle random walk."""
+    accel_bias_mg: NotNegative = 1.0
+    accel_bias_drift_mg_sqrt_h: NotNegative = 0.3
+    """mg after one hour."""
+    accel_noise_mps_sqrt_h: NotNegative = 0.1
+    """Velocity random walk."""
+    scale_factor: Annotated[float, Field(ge=0.0, lt=0.5)] = 3e-4
+    """Relative, of each gyro and accelerometer."""
+    error_factor: Annotated[float, Field(ge=0.0, le=100.0)] = 1.0
+    """By which all these errors are greater than navigation believes, which is what the other keys say."""
+
+
+class PitotConfig(Section):
+    """``[pitot]``: the airspeed measurement."""
+
+    noise_mps: NotNegative = 0.3
+    """1 σ of each sample."""
+    lag_s: NotNegative = 0.1
+    """Time constant."""
+    scale_error: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
+    """By this share it reads too high: calibration, and where on the airframe it sits."""
+
+
+class NavigationConfig(Section):
+    """``[navigation]``: how the filter starts, what it believes and when it gives up."""
+
+    start_frames: Annotated[int, Field(ge=2, le=1000)] = 15
+    """Camera frames from which the first state is made."""
+    start_speed_sigma_mps: Positive = 0.5
+    """Of the first velocity, on each axis: the wind, the pitot tube and the sideslip are in it."""
+    gate_early: Positive = 22.5
+    """Greatest normalised innovation squared of three lines, six numbers."""
+    gate_late: Positive = 18.5
+    """The same of two lines, four numbers."""
+    start_attitude_sigma_deg: Positive = 5.0
+    """The filter waits while one frame's attitude is known no better than this: a mean of such poses is no start."""
+    min_noise_px: Positive = 0.05
+    """The filter believes no line's points better than this: beyond it, the curvature of the projection counts."""
+    airspeed_smoothing_s: Positive = 0.2
+    """Time constant of the low-pass on the pitot tube's noise."""
+    max_position_sigma_m: Positive = 500.0
+    """Diverged when the filter's own σ of the position passes this."""
+    max_rejected_frames: Annotated[int, Field(ge=1)] = 300
+    """Diverged when more frames than this in succession do not pass the gate."""
+    handover: Literal["in-view", "latched"] = "in-view"
+    """When three lines are used: whenever the threshold is in view, or until it has once left the image."""
