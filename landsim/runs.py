@@ -128,6 +128,19 @@ def new_run(name: str, out: Path | None = None, root: Path = Path("runs")) -> It
         raise
 
 
+def numbered_folder(name: str, root: Path = Path("runs")) -> Path:
+    """Make the next numbered folder, ``<root>/NNN-<name>``, which two processes never get both; it is empty.
+
+    Raises
+    ------
+    RunFolderError
+        If it cannot be made.
+    """
+    with new_run(name, root=root) as place:
+        pass
+    return place.final
+
+
 def write_run(folder: Path, scenario: Scenario, flight: Flown) -> None:
     """Write scenario.toml, log.parquet and metrics.json into an existing folder.
 

@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -163,3 +164,85 @@ def progress_bar(text: str) -> "Iterator[Callable[[float, float, str], None] | N
         yield lambda done, total, what: bar.update(
             task, completed=done, total=total, description=escape(f"{text}: {what}")
         )
+
+
+PLAIN_EVERY_S = 10.0
+"""Between the lines that tell how far flights are where there is no terminal."""
+
+
+class FlightRate:
+    """How fast flights come and how many of them succeed.
+
+    Parameters
+    ----------
+    total, done : int
+        Flights there are to be, and those that have been flown before.
+    clock : callable
+        Seconds, from any time on.
+    """
+
+    def __init__(self, total: int, done: int, clock: Callable[[], float] = time.monotonic) -> None:
+        self.total, self.done = total, done
+        self.flown = self.succeeded = 0
+        self._clock = clock
+        self._first = self._last = 0.0
+
+    def add(self, *, success: bool) -> None:
+        """Count a flight that has just been finished."""
+        self._last = self._clock()
+        if not self.flown:
+            self._first = self._last
+        self.flown += 1
+        self.done += 1
+        self.succeeded += success
+
+    @property
+    def per_second(self) -> float | None:
+        """Flights a second since the first was finished, so without the start of those who fly; None before two."""
+        taken = self._last - self._first
+        return (self.flown - 1) / taken if self.flown > 1 and taken > 0.0 else None
+
+    def text(self) -> str:
+        """How fast, for how long still, and how well, in words."""
+        rate = self.per_second
+        if rate is None:
+            return "starting" if not self.flown else f"{self.succeeded} of {self.flown} in the box"
+        left = round((self.total - self.done) / rate)
+        told = f"{rate:.1f} flights/s, {left // 3600}:{left // 60 % 60:02d}:{left % 60:02d} left"
+        return f"{told}, {100.0 * self.succeeded / self.flown:.1f} % in the box"
+
+
+@contextmanager
+def flight_progress(text: str, rate: FlightRate) -> "Iterator[Callable[[bool], None]]":
+    """Shows how far flights are: as a bar on a terminal, else as a line now and then.  What it yields counts one."""
+    if not sys.stderr.isatty():
+        with _plain_progress(text, rate) as count:
+            yield count
+        return
+    from rich.markup import escape
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[told]}"))
+    with Progress(*columns, console=console_of(stderr=True), transient=True) as bar:
+        task = bar.add_task(escape(text), total=rate.total, completed=rate.done, told=rate.text())
+
+        def count(success: bool) -> None:
+            rate.add(success=success)
+            bar.update(task, completed=rate.done, told=rate.text())
+
+        yield count
+
+
+@contextmanager
+def _plain_progress(text: str, rate: FlightRate) -> "Iterator[Callable[[bool], None]]":
+    last = time.monotonic()
+
+    def count(success: bool) -> None:
+        nonlocal last
+        rate.add(success=success)
+        now = time.monotonic()
+        if now - last >= PLAIN_EVERY_S:
+            last = now
+            tell(f"{text}: {rate.done} of {rate.total} flights, {rate.text()}")
+
+    yield count

@@ -6,6 +6,7 @@ at different speeds can be laid over each other.
 """
 
 import math
+from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -13,7 +14,8 @@ from numpy.typing import ArrayLike
 
 from estimator.so3 import Array
 from landsim.config import Scenario
-from landsim.errors import InputError
+from landsim.dispersion import dispersed, draws_of_seed, keys_of
+from landsim.errors import InputError, traceback_of
 from landsim.log import QUANTITIES, Log
 from landsim.metrics import CRASHES, EARLY_NUMBERS, LATE_NUMBERS, error
 from landsim.simulate import Flight, fly, must_fly
@@ -32,6 +34,11 @@ START = ("along_m", "cross_m", "height_m", "heading_deg", "speed_mps")
 TOUCHDOWN = ("x_m", "y_m", "sink_rate_mps", "ground_speed_mps", "pitch_deg", "bank_deg", "heading_error_deg")
 TRACKING = ("glide_slope_m", "localizer_m", "glide_slope_to_flare_m")
 ESTIMATES = ("vision", "fused")
+PHASES = ("early", "late", "coasting", "rollout")
+"""Of a flight's consistency."""
+DRAW = "draw."
+"""What the names of dispersed keys' columns begin with."""
+NORMALISED = ("nees9_mean", "nees15_mean")
 
 
 def _stated(name: str, what: str) -> str:
@@ -41,12 +48,14 @@ def _stated(name: str, what: str) -> str:
 
 
 SCALARS: dict[str, type] = {
+    "index": int,
     "seed": int,
     "line_noise": str,
     "outcome": str,
     "in_box": bool,
     "reason": str,
     "end": str,
+    "traceback": str,
     **{f"start_{name}": float for name in START},
     **dict.fromkeys(TOUCHDOWN, float),
     "touchdown_time_s": float,
@@ -56,10 +65,17 @@ SCALARS: dict[str, type] = {
     "stop_time_s": float,
     **{_stated(name, of): float for name in TRACKING for of in ("rms", "p95")},
     **{f"{source}_{_stated(q, of)}": float for source in ESTIMATES for q in QUANTITIES for of in ("rms", "p95")},
+    **{f"{name}_{phase}": float for phase in PHASES for name in NORMALISED},
+    **{f"frames_{phase}": int for phase in PHASES},
+    **{f"coverage95_{q}": float for q in QUANTITIES},
+    "coverage_frames": int,
     "flight_time_s": float,
     "wall_time_s": float,
 }
-"""The scalars of a row and their types, in order; each may be None.  The touchdown's have the names of metrics.json."""
+"""The scalars of a row and their types, in order; each may be None.  The touchdown's have the names of metrics.json.
+
+``index`` is the flight's place in its batch, which the batch knows and a flight does not.
+"""
 ARRAYS: tuple[str, ...] = (
     "distance_m",
     "time_s",
@@ -84,7 +100,19 @@ def distances_of(scenario: Scenario) -> Array:
     return np.asarray(np.unique(np.append(grid, ranges))[::-1])
 
 
-def flight_row(scenario: Scenario, seed: int, distances: ArrayLike | None = None) -> Row:
+def scalars_of(scenario: Scenario) -> dict[str, type]:
+    """The scalars of a scenario's rows and their types, in order: `SCALARS`, and ``draw.<key>`` of what is drawn."""
+    return SCALARS | {f"{DRAW}{key}": float for key in keys_of(scenario)}
+
+
+def flight_row(
+    scenario: Scenario,
+    seed: int,
+    distances: ArrayLike | None = None,
+    draws: Mapping[str, float] | None = None,
+    *,
+    look: Callable[[Flight], None] | None = None,
+) -> Row:
     """Fly a scenario once, and say in one row what came of it.
 
     Parameters
@@ -95,44 +123,81 @@ def flight_row(scenario: Scenario, seed: int, distances: ArrayLike | None = None
         Not negative.
     distances : (n,) array_like, optional
         To the threshold, m; without them, those of `distances_of`.
+    draws : mapping, optional
+        As for `landsim.simulate.fly`.
+    look : callable, optional
+        Is given the flight, if there is one, before it is a row.
 
     Returns
     -------
     dict
-        `SCALARS` and `ARRAYS`, every one of them in every row.  At each distance stand the numbers of the first camera
-        frame at or past it: ``vision_error_*`` of the pose that its lines alone give and ``fused_error_*`` of the
-        filter after it, estimate less true, ``sigma_*`` the filter's own, ``true_*`` the camera's pose, and as
-        ``stage`` what the frame offered, whether the filter believed it or not: 1 three lines, 2 two, 0 less.  An
-        exception in the flight makes a row with the outcome ``error``.
+        `scalars_of` the scenario and `ARRAYS`, every one of them in every row.  At each distance stand the numbers of
+        the first camera frame at or past it: ``vision_error_*`` of the pose that its lines alone give and
+        ``fused_error_*`` of the filter after it, estimate less true, ``sigma_*`` the filter's own, ``true_*`` the
+        camera's pose, and as ``stage`` what the frame offered, whether the filter believed it or not: 1 three lines, 2
+        two, 0 less.  An exception in the flight makes a row with the outcome ``error``.
 
     Raises
     ------
     InputError
-        If the aircraft's model does not load.
+        If the aircraft's model does not load, or the scenario does not allow a drawn value.
     ValueError
         If the scenario is not a flight, or the seed is not a whole number of zero or more.
     """
     must_fly(scenario, seed)
     at = np.asarray(distances_of(scenario) if distances is None else distances, dtype=float)
+    draws = draws_of_seed(scenario, seed) if draws is None else draws
     try:
-        return row_of(scenario, fly(scenario, seed), at)
+        flight = fly(scenario, seed, draws)
+        if look is not None:
+            look(flight)
+        return row_of(scenario, flight, at)
     except InputError:
         raise
     except Exception as failure:  # noqa: BLE001 - one flight must not take the others with it, and its row says why
-        lost: Row = dict.fromkeys(SCALARS)
-        lost |= {"seed": seed, "line_noise": scenario.camera.line_noise, "in_box": False}
-        lost |= {"outcome": "error", "end": "error", "reason": f"{type(failure).__name__}: {failure}"}
-        return lost | {name: np.full(at.size, np.nan) for name in ARRAYS} | {"distance_m": at}
+        return lost_row(scenario, seed, at, f"{type(failure).__name__}: {failure}", traceback_of(failure), draws)
+
+
+def lost_row(
+    scenario: Scenario,
+    seed: int,
+    distances: Array,
+    reason: str,
+    traceback: str | None = None,
+    draws: Mapping[str, float] | None = None,
+) -> Row:
+    """The row of a flight that came to nothing: outcome and end ``error``, the reason, and no number.
+
+    Parameters
+    ----------
+    scenario, seed, distances
+        As for `flight_row`.
+    reason : str
+        What became of it, in a line.
+    traceback : str, optional
+        Of `traceback_of`.
+    draws : mapping, optional
+        As for `landsim.simulate.fly`.
+    """
+    draws = draws_of_seed(scenario, seed) if draws is None else draws
+    lost: Row = dict.fromkeys(SCALARS)
+    lost |= {"seed": seed, "line_noise": scenario.camera.line_noise, "in_box": False}
+    lost |= {"outcome": "error", "end": "error", "reason": reason, "traceback": traceback}
+    lost |= {f"{DRAW}{key}": draws[key] for key in keys_of(scenario)}
+    return lost | {name: np.full(distances.size, np.nan) for name in ARRAYS} | {"distance_m": distances}
 
 
 def row_of(scenario: Scenario, flight: Flight, distances: Array) -> Row:
     """The row of a flight that has been flown; parameters and result as for `flight_row`."""
     metrics = flight.metrics
     touchdown, stop = metrics["touchdown"] or {}, metrics["stop"] or {}
+    consistency, coverage = metrics["consistency"], metrics["coverage"]
     row: Row = {
+        "index": None,
         "seed": metrics["seed"],
         "line_noise": scenario.camera.line_noise,
         **{name: metrics[name] for name in ("outcome", "in_box", "reason", "end")},
+        "traceback": metrics.get("traceback"),
         **{f"start_{name}": metrics["start"].get(name) for name in START},
         **{name: touchdown.get(name) for name in TOUCHDOWN},
         "touchdown_time_s": touchdown.get("time_s"),
@@ -145,10 +210,16 @@ def row_of(scenario: Scenario, flight: Flight, distances: Array) -> Row:
             for q in QUANTITIES
             for of in ("rms", "p95")
         },
+        **{f"{name}_{phase}": consistency[phase][name] for phase in PHASES for name in NORMALISED},
+        **{f"frames_{phase}": consistency[phase]["frames"] for phase in PHASES},
+        **{f"coverage95_{q}": coverage[q] for q in QUANTITIES},
+        "coverage_frames": coverage["frames"],
         "flight_time_s": metrics["flight_time_s"],
         "wall_time_s": metrics["wall_time_s"],
+        **{f"{DRAW}{key}": metrics["draws"][key] for key in keys_of(scenario)},
     }
-    every = round(scenario.simulation.rate_hz / scenario.camera.rate_hz)
+    flown = dispersed(scenario, metrics["draws"])
+    every = round(flown.simulation.rate_hz / flown.camera.rate_hz)
     return row | by_distance(flight.log, distances, every, crashed=metrics["end"] in CRASHES)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.random import SeedSequence
 
 from estimator.so3 import Array
+from landsim.batch.pool import cores
 from landsim.batch.row import Row, distances_of, flight_row
 from landsim.config import Scenario, StudyConfig
 from landsim.errors import InputError
@@ -30,7 +31,7 @@ from landsim.study.peers import DRAWS as PEER_DRAWS
 from landsim.study.peers import peers
 from landsim.study.plan import Plan, plan_of
 from landsim.study.precision import required_precision
-from landsim.study.tasks import Progress, Task, cores, processes, run_tasks
+from landsim.study.tasks import Progress, Task, processes, run_tasks
 from landsim.study.tilt import tilt
 from landsim.study.timing import timing
 from landsim.study.translations import translations

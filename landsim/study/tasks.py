@@ -1,7 +1,5 @@
 """Work in processes: many small tasks, their results in order, whatever the number of workers."""
 
-import os
-import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -24,26 +22,13 @@ class Task(NamedTuple):
     """Said of it."""
 
 
-def cores() -> int:
-    """Processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
 @contextmanager
 def processes(count: int) -> Iterator[Executor | None]:
-    """Workers for `run_tasks`, to which an interrupt does not speak: it is the calling process's to answer.
-
-    None with a count of one: the work is done in the calling process.
-    """
+    """Workers for `run_tasks`; None with a count of one: the work is done in the calling process."""
     if count <= 1:
         yield None
         return
     with workers(count) as pool:
-        with _ignored(signal.SIGINT):  # a signal that is ignored when a process begins stays so in it
-            for _ in range(count):
-                pool.submit(int)  # begins one
         yield pool
 
 
@@ -87,17 +72,3 @@ def run_tasks(
             future.cancel()
         raise
     return results
-
-
-@contextmanager
-def _ignored(number: signal.Signals) -> Iterator[None]:
-    """Within it a signal is ignored, if this is the thread that may say so."""
-    try:
-        before = signal.signal(number, signal.SIG_IGN)
-    except ValueError:
-        yield
-        return
-    try:
-        yield
-    finally:
-        signal.signal(number, before)
