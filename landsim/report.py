@@ -1,6 +1,7 @@
-"""Draws the pictures of a run or a study into its folder."""
+"""Pictures of a run, a study, a batch and a comparison, and the pages of the last two, into their folder."""
 
-from collections.abc import Sequence
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ from landsim.metrics import Log
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from landsim.charts.model import Chart
     from landsim.config import Scenario
     from landsim.study.model import Envelope
 
@@ -94,6 +96,94 @@ def draw_study(
     if "tilt" in verdict["claims"]:
         paths += draw_tilt(folder, verdict["claims"]["tilt"], scenario, seed)
     return paths
+
+
+def write_report(folder: Path, scenario: "Scenario", summary: Mapping[str, Any], *, plots: bool = True) -> list[Path]:
+    """Write the report of a batch: ``report.html``, and each of its figures as PNG and as PDF.
+
+    Parameters
+    ----------
+    folder : Path
+        Exists; files of the same names in it are replaced.
+    scenario : Scenario
+        Of the batch, with its dispersions.
+    summary : mapping
+        Of ``landsim.batch.summary.summarise``, or as summary.json has it.
+    plots : bool
+        Whether to draw the figures as files too.
+
+    Returns
+    -------
+    list of Path
+        The page first.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be written; what stood there before then stands there still.
+    """
+    from landsim import __version__
+    from landsim.charts.batch import batch_charts
+    from landsim.config import resolved_toml
+    from landsim.page.batch import batch_document
+    from landsim.page.render import render
+
+    document = batch_document(summary, resolved_toml(scenario), _named(folder))
+    page = _write(folder / "report.html", render(document, __version__))
+    return [page, *(_draw_charts(folder, batch_charts(summary).values()) if plots else [])]
+
+
+def write_comparison(folder: Path, compared: Mapping[str, Any], *, plots: bool = True) -> list[Path]:
+    """Write the report of a comparison: ``compare.html``, and each of its figures as PNG and as PDF.
+
+    Parameters
+    ----------
+    folder : Path
+        Exists; files of the same names in it are replaced.
+    compared : mapping
+        Of ``landsim.batch.compare.compare``, or as compare.json has it.
+    plots : bool
+        Whether to draw the figures as files too.
+
+    Returns
+    -------
+    list of Path
+        The page first.
+
+    Raises
+    ------
+    OSError
+        As `write_report` does.
+    """
+    from landsim import __version__
+    from landsim.charts.comparison import comparison_charts
+    from landsim.page.comparison import comparison_document
+    from landsim.page.render import render
+
+    page = _write(folder / "compare.html", render(comparison_document(compared), __version__))
+    return [page, *(_draw_charts(folder, comparison_charts(compared).values()) if plots else [])]
+
+
+def _draw_charts(folder: Path, sections: "Iterable[Sequence[Chart]]") -> list[Path]:
+    from landsim.plots.chart import draw_chart  # matplotlib takes most of a second
+
+    return [path for charts in sections for chart in charts for path in draw_chart(folder, chart)]
+
+
+def _named(folder: Path) -> str:
+    """A folder as a shell takes it: as it was given, or its name alone where that is the whole path of a machine."""
+    return shlex.quote(folder.name if folder.is_absolute() else folder.as_posix())
+
+
+def _write(path: Path, text: str) -> Path:
+    """Write beside the path, then rename."""
+    beside = path.with_name(f".{path.name}.part")
+    try:
+        beside.write_text(text, encoding="utf-8", newline="\n")
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
+    return path
 
 
 def _save(figure: "Figure", path: Path) -> Path:

@@ -1,0 +1,259 @@
+"""How often a batch landed, where, and how well: charts of the summary's rates, touchdown, distributions, tracking."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from landsim.charts.model import (
+    Axis,
+    Chart,
+    Curve,
+    Dash,
+    Histogram,
+    Limit,
+    Mark,
+    Panel,
+    Points,
+    Region,
+    Series,
+    Tone,
+)
+from landsim.charts.shared import (
+    beyond,
+    floor_of,
+    limits_near,
+    number,
+    percent,
+    rates,
+    several,
+    share_floor,
+    unit_of,
+    with_unit,
+)
+
+ELLIPSES: Mapping[float, tuple[Dash, float]] = {50.0: ("solid", 1.0), 95.0: ("dash", 1.2), 99.7: ("dot", 1.5)}
+"""Dash and width of an ellipse."""
+FIRST = ("sink_rate_mps", "y_m", "x_m", "bank_deg", "ground_speed_mps")
+"""Measures that stand in the first chart of distributions; the others are in a second."""
+SHORT = 60.0
+"""Of the approach before the threshold this much is drawn with the runway, m."""
+BANDED = "; the tint is the 95 % confidence of the share, and where no flight is left it says what so many still allow"
+
+
+def rate_charts(summary: Mapping[str, Any]) -> tuple[Chart, ...]:
+    """Success and outcomes with their intervals, and how often each limit was missed."""
+    found = summary["rates"]
+    rows: list[tuple[str, Mapping[str, Any]]] = [("landed in the box", found["success"]), ("landed", found["landed"])]
+    rows += [(one["outcome"], one) for one in found["outcomes"] if one["count"] and one["outcome"] != "landed"]
+    rows = [(name, entry) for name, entry in rows if entry["rate"] is not None]
+    if not rows:
+        return ()
+    names, entries = tuple(name for name, _ in rows), [entry for _, entry in rows]
+    outcome = Panel(
+        Axis("share of the flights", "%", span=(-2.0, 102.0)),
+        Axis("", ticks=names),
+        (rates("rate", entries, range(len(rows)), "blue"),),
+        title="how the flights ended",
+        height=0.16 + 0.12 * len(rows),
+    )
+    panels = [outcome]
+    limits = [one for one in found["limits"] if one["rate"] is not None]
+    if limits:
+        floor = floor_of(limits)
+        labels = tuple(
+            f"{one['title']} {'>' if one['side'] == 'above' else '<'} {with_unit(one['limit'], one['unit'])}"
+            for one in limits
+        )
+        panels.append(
+            Panel(
+                Axis("share of the flights beyond it", "%", log=True, span=(floor, 130.0)),
+                Axis("", ticks=labels),
+                (rates("rate", limits, range(len(limits)), "vermilion", floor),),
+                title="limits of the box that were missed; a bar without a point: no flight was beyond it",
+                height=0.16 + 0.12 * len(limits),
+            )
+        )
+    caption = (
+        f"{percent(found['success']['rate'])} of {found['success']['n']} flights landed in the box. The bars are"
+        " two-sided Clopper–Pearson intervals with 95 % confidence."
+    )
+    return (Chart("rates", "Success, outcomes and missed limits", tuple(panels), 1, caption),)
+
+
+def touchdown_charts(summary: Mapping[str, Any]) -> tuple[Chart, ...]:
+    """Touchdowns on the runway as drawn, and closer."""
+    found = summary["touchdown"]
+    if not found["n"]:
+        return ()
+    points = _points(found)
+    ellipses = tuple(
+        Curve(
+            f"{one['level']:g} % ellipse", tuple(one["polygon"]["x_m"]), tuple(one["polygon"]["y_m"]), "ink",
+            *ELLIPSES.get(one["level"], ("dashdot", 1.0)),
+        )
+        for one in found["ellipses"]
+        if one["center"] is not None
+    )  # fmt: skip
+    box, runway = found["box"], found["runway"]
+    half, cross = 0.5 * runway["width_m"], box["cross_max_m"]
+    farthest = max([box["along_max_m"], found["aim_point_m"], *found["points"]["x_m"]])
+    nearest = min([-SHORT, *(x - SHORT for x in found["points"]["x_m"])])
+    widest = max([half, cross, *(abs(y) for y in found["points"]["y_m"])])
+    end = min(farthest * 1.12 + SHORT, max(runway["length_m"] + SHORT, farthest + SHORT))
+    along, across = "past the threshold", "right of the centreline"
+    boxed = f"box: {number(box['along_min_m'])} to {number(box['along_max_m'])} m, ±{number(cross)} m"
+    whole = Panel(
+        Axis(along, "m", span=(nearest, end)),
+        Axis(across, "m", span=(-1.15 * widest, 1.15 * widest)),
+        (Curve("", (0.0, runway["length_m"]), (0.0, 0.0), "grey", "dash", 0.8, legend=False), *points),
+        (
+            Region((0.0, runway["length_m"]), (-half, half), "", "pale", 0.35),
+            Region((box["along_min_m"], box["along_max_m"]), (-cross, cross), boxed, "green"),
+            Limit("x", 0.0, "threshold", "grey", "solid"),
+            Limit("x", found["aim_point_m"], "aim point", "grey", "dot"),
+        ),
+        title="on the runway; scales differ",
+    )
+    x_span, y_span = _close(found, "x"), _close(found, "y")
+    edges = [
+        *(Limit("x", box[key], f"box: {number(box[key])} m") for key in ("along_min_m", "along_max_m")),
+        *(Limit("y", side, f"box: {number(side)} m") for side in (-cross, cross)),
+        Limit("y", 0.0, "", "grey", "dash"),
+    ]
+    spans = {"x": x_span, "y": y_span}
+    seen = tuple(one for one in edges if spans[one.along][0] < one.at < spans[one.along][1])
+    close = Panel(
+        Axis(along, "m", span=x_span),
+        Axis(across, "m", span=y_span),
+        (*points, *ellipses),
+        seen,
+        title="closer: the touchdowns and the ellipses alone",
+        height=1.4,
+    )
+    caption = (
+        "Midpoint of the main wheels at first contact. An ellipse holds the next touchdown with its probability, if"
+        f" touchdowns are normally distributed. Drawn: {found['points_rule']}."
+    )
+    return (Chart("touchdown", f"Where {several(found['n'], 'flight')} touched down", (whole, close), 1, caption),)
+
+
+def _points(found: Mapping[str, Any]) -> tuple[Points, ...]:
+    """Touchdowns in the box, and those of flights that missed it."""
+    p = found["points"]
+    series = []
+    looks: tuple[tuple[str, bool, Tone, Mark], ...] = (
+        ("in the box", True, "blue", "dot"),
+        ("not in the box", False, "vermilion", "cross"),
+    )
+    for name, inside, tone, mark in looks:
+        rows = [i for i, one in enumerate(p["in_box"]) if bool(one) is inside]
+        if rows:
+            hover = tuple(
+                f"flight {p['index'][i]}, seed {p['seed'][i]}\n{p['outcome'][i]}\nsink rate: "
+                f"{with_unit(p['sink_rate_mps'][i], 'm/s')}"
+                for i in rows
+            )
+            x, y = (tuple(p[key][i] for i in rows) for key in ("x_m", "y_m"))
+            size = 4.5 if mark == "cross" else 3.5 if len(p["x_m"]) <= 300 else 2.2
+            series.append(Points(name, x, y, tone, mark, size, hover))
+    return tuple(series)
+
+
+def _close(found: Mapping[str, Any], letter: str) -> tuple[float, float]:
+    """What the touchdowns and the ellipses span, and a margin."""
+    values = list(found["points"][f"{letter}_m"])
+    values += [v for one in found["ellipses"] if one["center"] is not None for v in one["polygon"][f"{letter}_m"]]
+    low, high = min(values), max(values)
+    margin = 0.08 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
+def distribution_charts(summary: Mapping[str, Any]) -> tuple[Chart, ...]:
+    """A histogram and the share beyond on a logarithmic scale, a row a measure."""
+    entries = summary["distributions"]
+    first = [entry for key in FIRST for entry in entries if entry["key"] == key]
+    others = [entry for entry in entries if entry["key"] not in FIRST]
+    charts = []
+    for name, title, chosen in (
+        ("distributions", "Distributions at touchdown, and how many flights go beyond a value", first),
+        ("distributions-more", "Attitude at touchdown and the stop, and how many flights go beyond a value", others),
+    ):
+        if chosen:
+            panels = tuple(panel for entry in chosen for panel in (_histogram(entry), _beyond(entry)))
+            charts.append(Chart(name, title, panels, 2, f"Left: flights a bin. Right: share of the flights{BANDED}."))
+    return tuple(charts)
+
+
+def _limits(entry: Mapping[str, Any]) -> list[tuple[float, str]]:
+    """Limits of a measure with their labels; of a magnitude to either side."""
+    found = []
+    for limit in entry["limits"]:
+        signs = (-1.0, 1.0) if limit["magnitude"] else (1.0,)
+        found += [(sign * limit["value"], with_unit(sign * limit["value"], entry["unit"])) for sign in signs]
+    return found
+
+
+def _histogram(entry: Mapping[str, Any]) -> Panel:
+    edges, counts = entry["histogram"]["edges"], entry["histogram"]["counts"]
+    span = (edges[0], edges[-1])
+    near, far = limits_near(_limits(entry), span)
+    median = next((q["value"] for q in entry["quantiles"] if q["p"] == 0.5), None)
+    middle = () if median is None else (Limit("x", median, "median", "ink", "dot"),)
+    return Panel(
+        Axis(entry["title"], unit_of(entry["unit"])),
+        Axis("flights", whole=True),
+        (Histogram("flights", tuple(edges), tuple(counts), legend=False),),
+        (*middle, *near),
+        title=far,
+    )
+
+
+def _beyond(entry: Mapping[str, Any]) -> Panel:
+    curves = entry["exceedance"]
+    floor = share_floor(curves)
+    missed = {limit["side"]: limit["missed"] for limit in entry["limits"]}
+    one = len(curves) == 1
+    looks: Mapping[str, tuple[Tone, Dash]] = {"above": ("blue", "solid"), "below": ("vermilion", "dash")}
+    series: list[Series] = []
+    for curve in curves:
+        side = curve["side"]
+        series += beyond(f"at x or {side}", curve, missed.get(side), curve["limit"], floor, *looks[side])
+    title = f"|{entry['title']}|" if curves and curves[0]["magnitude"] else entry["title"]
+    limits = tuple(
+        Limit("x", curve["limit"], f"limit {with_unit(curve['limit'], entry['unit'])}")
+        for curve in curves
+        if curve["limit"] is not None
+    )
+    label = "share at x or above" if one else "share at x or beyond"
+    return Panel(
+        Axis(title, unit_of(entry["unit"])),
+        Axis(label, "%", log=True, span=(floor, 160.0)),
+        tuple(series),
+        limits,
+    )
+
+
+def tracking_charts(summary: Mapping[str, Any]) -> tuple[Chart, ...]:
+    """Each flight's 95th percentile of the deviation, beside the published criteria."""
+    panels = [_tracking(entry) for entry in summary["tracking"] if entry["p95"]["histogram"] is not None]
+    if not panels:
+        return ()
+    caption = (
+        "Each flight gives one number: the deviation that 95 % of its approach stays within, from 1000 m before the"
+        " threshold. The limits are published ones for transport aircraft, from secondary sources; to meet one"
+        " certifies nothing."
+    )
+    return (
+        Chart("tracking", "How near the flights kept to the glide slope and the centreline", tuple(panels), 3, caption),
+    )
+
+
+def _tracking(entry: Mapping[str, Any]) -> Panel:
+    shape = entry["p95"]["histogram"]
+    criteria = tuple(
+        Limit("x", one["limit"], f"criterion {'≈ ' if one['estimate'] else ''}{with_unit(one['limit'], 'm')}")
+        for one in entry["criteria"]
+    )
+    bins = Histogram("flights", tuple(shape["edges"]), tuple(shape["counts"]), legend=False)
+    return Panel(
+        Axis("95 % of the approach within", "m"), Axis("flights", whole=True), (bins,), criteria, entry["title"]
+    )
