@@ -258,6 +258,48 @@ def transition(nominal: Array, dt: float) -> Array:
     return result
 
 
+@compiled
+def predicted(nominal: Array, covariance: Array, noise: Array, dt: float) -> tuple[Array, Array]:
+    """Covariance of the errors over several intervals of the inertial unit, F P Fᵀ + Q with F as `transition`.
+
+    Three quarters of F are zero, and the rows of a product that they would add to are left out.
+
+    Parameters
+    ----------
+    nominal : (18,) array
+        At the end of the time, with the specific force integrated over it.
+    covariance : (15, 15) array
+        P, symmetric, at the beginning of the time.
+    noise : (15, 15) array
+        Q.
+    dt : float
+        s.
+
+    Returns
+    -------
+    (18,), (15, 15) array
+        The nominal state with no specific force any more, and the covariance at the end of the time.
+    """
+    F = transition(nominal, dt)
+    half, result = np.zeros((STATES, STATES)), noise.copy()
+    _add_product(half, F, covariance)
+    _add_product(result, F, half.T.copy())  # F (F P)ᵀ = F P Fᵀ
+    moved = nominal.copy()
+    moved[15:] = 0.0
+    return moved, result
+
+
+@compiled
+def _add_product(result: Array, sparse: Array, matrix: Array) -> None:
+    """Add the product of two matrices (15, 15), of which the first is mostly zero, to a third."""
+    for i in range(STATES):
+        for k in range(STATES):
+            factor = sparse[i, k]
+            if factor != 0.0:
+                for j in range(STATES):
+                    result[i, j] += factor * matrix[k, j]
+
+
 def process_noise(noise: ImuNoise, dt: float) -> Array:
     """Covariance (15, 15) that the inertial unit's noise adds to the errors over a time.
 
