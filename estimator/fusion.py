@@ -90,7 +90,7 @@ class _Inverse:
 
 
 def _update_of(base: type[Any]) -> Any:
-    """The update of filterpy as it stands, with `_Inverse` for scipy's inverse, whose checks cost as much as the rest."""
+    """The update of filterpy as it stands, but for scipy's inverse, whose checks take as long as all the rest."""
     update = base.update
     return types.FunctionType(
         update.__code__, {**update.__globals__, "linalg": _Inverse}, "update", update.__defaults__, update.__closure__
