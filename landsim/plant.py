@@ -389,8 +389,11 @@ class Plant:
         if down > -CONTACT_HEIGHT:
             # here the ellipsoid's normal through the aircraft meets the runway's plane
             self._set_terrain(altitude + down / (FT * cosine))
-            nose, left, right = [read() != 0.0 for read in self._wheels]
-            touching = any([read() != 0.0 for read in self._structure])  # noqa: C419 (a list is faster)
+            on_nose, on_left, on_right = self._wheels
+            nose, left, right = on_nose() != 0.0, on_left() != 0.0, on_right() != 0.0
+            for touches in self._structure:
+                if touches() != 0.0:
+                    touching = True
         return Truth(
             self._steps * self._dt,
             motion,

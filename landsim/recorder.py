@@ -5,6 +5,7 @@ afterwards, for all rows at once.
 """
 
 import contextlib
+import struct
 from collections.abc import Iterable, Sequence
 from itertools import chain
 from operator import itemgetter
@@ -49,10 +50,19 @@ def _columns(rows: int, numbers: Iterable[float]) -> Array:
 
 _SCALARS = ("time", "airspeed", "wow_nose", "wow_left", "wow_right", "elevator", "aileron", "rudder", "throttle")
 _scalars = itemgetter(*(Truth._fields.index(name) for name in _SCALARS))
+STEP = (*_SCALARS, "ready", "stage", "phase", "pitot", "tilt", "reading")
+"""The single numbers that `Recorder.step` takes down, in its order."""
+_packed = struct.Struct(f"{len(STEP)}d").pack
+
+
+def _stacked(arrays: Sequence[Array]) -> Array:
+    """Arrays of one shape (...) as one, (n, ...)."""
+    joined = bytearray().join(arrays)  # type: ignore[arg-type]  # arrays are buffers, which only newer stubs know
+    return np.frombuffer(joined).reshape(len(arrays), *arrays[0].shape)
 
 
 def _body(motions: Sequence[Array]) -> Body:
-    rows = np.concatenate(motions).reshape(len(motions), -1)
+    rows = _stacked(motions)
     return Body(rows[:, :3], rows[:, 3:6], rows[:, 6:15].reshape(-1, 3, 3))
 
 
@@ -92,10 +102,12 @@ class Recorder:
         self._width = width
         self._mount = mount
         self._wheels = wheels
-        self._truths: list[Truth] = []
+        self._motions: list[Array] = []
         self._nominals: list[Array] = []
+        self._numbers = bytearray()
         self._commands: list[Command] = []
-        self._others: list[float] = []
+        self._command_rows: list[int] = []
+        self._command: Command | None = None
         self._count = 0
         self._frames: list[float] = []
         self._frame_rows: list[int] = []
@@ -118,11 +130,16 @@ class Recorder:
         reading: float,
     ) -> None:
         """Take down a step; the frame of the same step comes before it."""
+        if command is not self._command:
+            self._command = command
+            self._commands.append(command)
+            self._command_rows.append(self._count)
         self._count += 1
-        self._truths.append(truth)
+        self._motions.append(truth.motion)
         self._nominals.append(navigator.nominal)
-        self._commands.append(command)
-        self._others += (navigator.filter is not None, navigator.stage, phase, pitot, tilt, reading)
+        self._numbers += _packed(
+            *_scalars(truth), navigator.filter is not None, navigator.stage, phase, pitot, tilt, reading
+        )
 
     def frame(self, view: View, result: FrameResult, running: InertialVisionFilter | None, imu: Imu) -> None:
         """Take down a camera frame."""
@@ -143,15 +160,15 @@ class Recorder:
         log = {column.name: np.full(self._count, np.nan) for column in COLUMNS}
         if self._count == 0:
             return log
-        ready, stage, phase, pitot, tilt, reading = _columns(self._count, self._others)
-        truths = self._truths
-        true, fused = _body([truth.motion for truth in truths]), _body(self._nominals)
+        time, airspeed, *wow, elevator, aileron, rudder, throttle, ready, stage, phase, pitot, tilt, reading = (
+            np.frombuffer(self._numbers).reshape(self._count, -1).T.copy()
+        )
+        true, fused = _body(self._motions), _body(self._nominals)
         for known in fused:
             known[ready == 0.0] = np.nan
-        time, airspeed, *wow, elevator, aileron, rudder, throttle = _columns(
-            self._count, chain.from_iterable(map(_scalars, truths))
-        )
-        command = dict(zip(Command._fields, _columns(self._count, chain.from_iterable(self._commands)), strict=True))
+        commands = _columns(len(self._commands), chain.from_iterable(self._commands))
+        held = np.diff(np.append(self._command_rows, self._count))
+        command = dict(zip(Command._fields, np.repeat(commands, held, axis=1), strict=True))
 
         log["time_s"] = time
         log["phase"], log["stage"] = phase, stage
@@ -186,12 +203,12 @@ class Recorder:
         measured = frame["nis_dof"] > 0.0
         for name in ("nis_dof", "nis", "accepted"):
             log[name][at[measured]] = frame[name][measured]
-        true_ends, seen_ends = np.array(self._true_ends), np.array(self._seen_ends)
+        true_ends, seen_ends = _stacked(self._true_ends), _stacked(self._seen_ends)
         for i, line in enumerate(LINES):
             for k, end in enumerate(ENDS):
                 log[f"{line}_true_{end}"][at] = true_ends[:, i, k]
                 log[f"{line}_seen_{end}"][at] = seen_ends[:, i, k]
-        lines = np.array(self._lines)[:, :, :3]
+        lines = _stacked(self._lines)[:, :, :3]
         lines[frame["late"] > 0.0, 1] = np.nan
         for quantity, column in zip(QUANTITIES, self._vision(lines, frame["roll"]), strict=True):
             log[f"vision_{quantity}"][at] = column
@@ -213,8 +230,8 @@ class Recorder:
         if not self._filter_rows:
             return
         at = np.array(self._filter_rows)
-        covariance = np.array(self._covariance)
-        bias, imu_error = np.array(self._bias), np.array(self._errors)
+        covariance = _stacked(self._covariance)
+        bias, imu_error = _stacked(self._bias), _stacked(self._errors)
         error = np.concatenate(
             (
                 true.position[at] - fused.position[at],

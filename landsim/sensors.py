@@ -87,20 +87,20 @@ class Imu:
         self._white = np.repeat((noise.gyro, noise.accel), 3) * math.sqrt(dt)
         self._last_bias = rng.standard_normal(6)
         self._last_bias *= (*[noise.gyro_bias] * 3, *[config.accel_bias_mg * MILLI_G] * 3)
-        self._scale = config.scale_factor * rng.standard_normal(6)
+        scale = config.scale_factor * rng.standard_normal(6)
         self._rng = rng
-        self._site = site.numbers()
+        self._setup = np.array((*site.numbers(), dt, *scale))
         self._count = 0
-        self._last = self._last_bias
+        self._last = self._last_bias.copy()
         self._draw()
         self._before = start.motion
 
     def _draw(self) -> None:
         """The biases of the next block of samples, and their white noise."""
         drift, white = self._rng.standard_normal((2, BLOCK, 6))
-        self._bias = self._last_bias + np.cumsum(drift * self._drift, axis=0)
-        self._last_bias = self._bias[-1]
-        self._noise = white * self._white
+        bias = self._last_bias + np.cumsum(drift * self._drift, axis=0)
+        self._last_bias = bias[-1]
+        self._errors = np.concatenate((bias, white * self._white), axis=1)
 
     def sample(self, truth: Truth) -> ImuSample:
         """The increments since the last call, which was one interval ago."""
@@ -108,11 +108,8 @@ class Imu:
             self._draw()
             self._count = 0
         before, self._before = self._before, truth.motion
-        self._last, sample = _sampled(
-            before, truth.motion, self._site, self._dt, self._scale, self._bias, self._noise, self._count
-        )
-        self._count += 1
-        return sample
+        count, self._count = self._count, self._count + 1
+        return _sampled(before, truth.motion, self._setup, self._errors, count, self._last)
 
     def errors(self) -> Array:
         """What the last sample was off by, its white noise apart.
@@ -124,19 +121,22 @@ class Imu:
         (6,) array
             Gyros (rad/s) and accelerometers (m/s²).
         """
-        return self._last
+        return self._last.copy()
 
 
 @compiled
-def _sampled(
-    before: Array, after: Array, site: Array, dt: float, scale: Array, bias: Array, noise: Array, row: int
-) -> tuple[Array, Array]:
-    """The errors of a sample as rates (6,), but for the white noise, and the sample (6,)."""
-    sample, errors = ideal_sample(before, after, site, dt), np.empty(6)
+def _sampled(before: Array, after: Array, setup: Array, errors: Array, row: int, last: Array) -> Array:
+    """A sample (6,).
+
+    `setup` is the site, the interval (s) and the scale factors; a row of `errors` is biases, as rates, and white noise.
+    What the sample is off by as rates, but for the white noise, is left in `last` (6,).
+    """
+    dt = setup[5]
+    sample = ideal_sample(before, after, setup, dt)
     for i in range(6):
-        errors[i] = scale[i] * sample[i] / dt + bias[row, i]
-        sample[i] += errors[i] * dt + noise[row, i]
-    return errors, sample
+        last[i] = setup[6 + i] * sample[i] / dt + errors[row, i]
+        sample[i] += last[i] * dt + errors[row, 6 + i]
+    return sample
 
 
 def _white(sigma: float, rng: Generator) -> Iterator[float]:
