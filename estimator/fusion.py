@@ -19,7 +19,7 @@ from estimator.compiled import compiled
 from estimator.innovation import Eye, Innovation, frame_innovation
 from estimator.mount import Mount
 from estimator.so3 import Array
-from estimator.strapdown import ImuNoise, Inertial, Site, advance, corrected, inertial, predicted
+from estimator.strapdown import ImuNoise, Inertial, Site, advance_into, corrected, inertial, predicted, rows
 
 
 class Gates(NamedTuple):
@@ -142,6 +142,7 @@ class InertialVisionFilter:
         self._gates = gates
         self.nominal = start.state.numbers()
         self.bias = np.zeros(6)
+        self._rows = rows(strapdown.NOMINAL)
         self._ekf = _ErrorFilter(dim_x=strapdown.STATES, dim_z=6)
         self._zero = np.zeros(strapdown.STATES)
         self._ekf.x = self._zero
@@ -160,10 +161,17 @@ class InertialVisionFilter:
         result: Array = self._ekf.P
         return result
 
-    def propagate(self, sample: Array, dt: float) -> None:
-        """Carry the nominal state on by one interval, whose sample (6,) is as `strapdown.advance` takes it."""
-        self.nominal = advance(self.nominal, self.bias, sample, self._site, dt)
+    def propagate(self, sample: Array, dt: float) -> tuple[float, float]:
+        """Carry the nominal state on by one interval, whose sample (6,) is as `strapdown.advance` takes it.
+
+        Returns
+        -------
+        roll, pitch : float
+            Of the body, at its end, rad.
+        """
+        before, self.nominal = self.nominal, next(self._rows)
         self._elapsed += dt
+        return advance_into(self.nominal, before, self.bias, sample, self._site, dt)
 
     def predict(self) -> None:
         """Carry the covariance on to the nominal state's time."""

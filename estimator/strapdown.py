@@ -9,6 +9,7 @@ Errors are true less estimated; that of the attitude is a rotation vector ψ in 
 R_true = exp([ψ×]) R_estimated.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -192,27 +193,53 @@ def advance(nominal: Array, bias: Array, sample: Array, site: Array, dt: float) 
     (18,) array
         At the interval's end.
     """
+    result = np.empty(NOMINAL)
+    advance_into(result, nominal, bias, sample, site, dt)
+    return result
+
+
+@compiled
+def advance_into(
+    result: Array, nominal: Array, bias: Array, sample: Array, site: Array, dt: float
+) -> tuple[float, float]:
+    """Write to `result` (18,) what `advance` gives; return the roll and the pitch (rad) there."""
     place = Site(site[0], (site[1], site[2], site[3]), site[4])
     angle = (sample[0] - bias[0] * dt, sample[1] - bias[1] * dt, sample[2] - bias[2] * dt)
     velocity = (sample[3] - bias[3] * dt, sample[4] - bias[4] * dt, sample[5] - bias[5] * dt)
     moved, force = propagate(unpacked(nominal), place, angle, velocity, dt)
-    result = np.empty(NOMINAL)
     for i in range(3):
         result[i] = moved.position[i]
         result[3 + i] = moved.velocity[i]
         result[15 + i] = nominal[15 + i] + force[i]
     for i in range(9):
         result[6 + i] = moved.attitude[i]
-    return result
+    roll, pitch, _ = to_euler(moved.attitude)
+    return roll, pitch
+
+
+def rows(width: int) -> Iterator[Array]:
+    """Arrays (width,) without end, to be written to; made many at a time, which is cheaper than one by one."""
+    while True:
+        yield from np.empty((256, width))
 
 
 @compiled
 def ideal_sample(before: Array, after: Array, site: Array, dt: float) -> Array:
     """What an ideal inertial unit reports between two states (15 or more,), as `increments`: (6,) array."""
+    result = np.empty(6)
+    ideal_sample_into(result, before, after, site, dt)
+    return result
+
+
+@compiled
+def ideal_sample_into(result: Array, before: Array, after: Array, site: Array, dt: float) -> None:
+    """Write to `result` (6,) what `ideal_sample` gives."""
     place = Site(site[0], (site[1], site[2], site[3]), site[4])
     start, end = unpacked(before), unpacked(after)
     angle, velocity = increments(start.position, start.velocity, start.attitude, end.velocity, end.attitude, place, dt)
-    return np.array((angle[0], angle[1], angle[2], velocity[0], velocity[1], velocity[2]))
+    for i in range(3):
+        result[i] = angle[i]
+        result[3 + i] = velocity[i]
 
 
 @compiled

@@ -100,6 +100,7 @@ class Navigator:
         self._rejected = 0
         self.airspeed = NAN
         self._sample = np.zeros(6)
+        self._angles: tuple[float, float] | None = None
         self._earth_rate = np.array(site.earth_rate)
         self._latch = config.handover == "latched"
         self._late = False
@@ -122,10 +123,11 @@ class Navigator:
         if self.filter is None:
             self._alignment.propagate(sample, self._dt)
         else:
-            self.filter.propagate(sample, self._dt)
+            self._angles = self.filter.propagate(sample, self._dt)
 
     def observe(self, frame: CameraFrame) -> FrameResult:
         """Take in a camera frame."""
+        self._angles = None  # as they will be known after the frame
         if self.filter is None:
             return self._align(_observed(frame.lines, self._noise_px), frame.tilt)
         self.filter.predict()
@@ -187,8 +189,10 @@ class Navigator:
 
     def roll_and_pitch(self) -> tuple[float, float]:
         """Of the body, rad: what the inner loops need between two calls of guidance."""
-        roll, pitch, _ = euler(self.nominal)
-        return roll, pitch
+        if self._angles is None:
+            roll, pitch, _ = euler(self.nominal)
+            self._angles = roll, pitch
+        return self._angles
 
     def state(self, time: float) -> NavState:
         """What guidance is given."""

@@ -18,6 +18,7 @@ import numpy as np
 
 from estimator.compiled import compiled
 from estimator.so3 import Array, Vec3, rotate, rotate_back
+from estimator.strapdown import rows
 from landsim.attitude import runway_attitude
 from landsim.errors import InputError
 from landsim.runway import Runway
@@ -217,6 +218,7 @@ class Plant:
                 *(runway.latitude, runway.longitude, runway.heading),
             )
         )
+        self._rows = rows(15)
         self._dt = 1.0 / rate_hz
         self._steps = 0
         self._started = False
@@ -384,7 +386,8 @@ class Plant:
             x, y, z, altitude, latitude, longitude, vx, vy, vz, phi, theta, psi, airspeed,
             elevator, aileron, rudder, throttle, thrust,
         ) = [read() for read in self._read]  # fmt: skip
-        motion, down, cosine = _motion(self._site, x, y, z, vx, vy, vz, latitude, longitude, phi, theta, psi)
+        motion = next(self._rows)
+        down, cosine = _motion(motion, self._site, x, y, z, vx, vy, vz, latitude, longitude, phi, theta, psi)
         nose = left = right = touching = False
         if down > -CONTACT_HEIGHT:
             # here the ellipsoid's normal through the aircraft meets the runway's plane
@@ -415,6 +418,7 @@ _attitude = compiled(runway_attitude)
 
 @compiled
 def _motion(
+    motion: Array,
     site: Array,
     x: float,
     y: float,
@@ -427,18 +431,17 @@ def _motion(
     phi: float,
     theta: float,
     psi: float,
-) -> tuple[Array, float, float]:
-    """From JSBSim's position and velocity (ECEF, ft) and angles (rad) to `Truth.motion`.
+) -> tuple[float, float]:
+    """Write to `motion`, which is `Truth.motion`, from JSBSim's position and velocity (ECEF, ft) and angles (rad).
 
-    `site` is R_runway_from_ecef times a foot, the origin in its axes (m), latitude, longitude and heading.  Given
-    besides are the z of the position (m) and the cosine of the angle between the verticals.
+    `site` is R_runway_from_ecef times a foot, the origin in its axes (m), latitude, longitude and heading.  Returned
+    are the z of the position (m) and the cosine of the angle between the verticals.
     """
     cosine, attitude = _attitude(site[12], site[13], site[14], latitude, longitude, phi, theta, psi)
-    motion = np.empty(15)
     for i in range(3):
         a, b, c = site[3 * i], site[3 * i + 1], site[3 * i + 2]
         motion[i] = a * x + b * y + c * z - site[9 + i]
         motion[3 + i] = a * vx + b * vy + c * vz
     for i in range(9):
         motion[6 + i] = attitude[i]
-    return motion, motion[2], cosine
+    return motion[2], cosine

@@ -5,7 +5,6 @@ afterwards, for all rows at once.
 """
 
 import contextlib
-import struct
 from collections.abc import Iterable, Sequence
 from itertools import chain
 from operator import itemgetter
@@ -50,9 +49,6 @@ def _columns(rows: int, numbers: Iterable[float]) -> Array:
 
 _SCALARS = ("time", "airspeed", "wow_nose", "wow_left", "wow_right", "elevator", "aileron", "rudder", "throttle")
 _scalars = itemgetter(*(Truth._fields.index(name) for name in _SCALARS))
-STEP = (*_SCALARS, "ready", "stage", "phase", "pitot", "tilt", "reading")
-"""The single numbers that `Recorder.step` takes down, in its order."""
-_packed = struct.Struct(f"{len(STEP)}d").pack
 
 
 def _stacked(arrays: Sequence[Array]) -> Array:
@@ -102,9 +98,9 @@ class Recorder:
         self._width = width
         self._mount = mount
         self._wheels = wheels
-        self._motions: list[Array] = []
+        self._truths: list[Truth] = []
         self._nominals: list[Array] = []
-        self._numbers = bytearray()
+        self._others: list[float] = []
         self._commands: list[Command] = []
         self._command_rows: list[int] = []
         self._command: Command | None = None
@@ -135,11 +131,9 @@ class Recorder:
             self._commands.append(command)
             self._command_rows.append(self._count)
         self._count += 1
-        self._motions.append(truth.motion)
+        self._truths.append(truth)
         self._nominals.append(navigator.nominal)
-        self._numbers += _packed(
-            *_scalars(truth), navigator.filter is not None, navigator.stage, phase, pitot, tilt, reading
-        )
+        self._others += (navigator.filter is not None, navigator.stage, phase, pitot, tilt, reading)
 
     def frame(self, view: View, result: FrameResult, running: InertialVisionFilter | None, imu: Imu) -> None:
         """Take down a camera frame."""
@@ -160,12 +154,14 @@ class Recorder:
         log = {column.name: np.full(self._count, np.nan) for column in COLUMNS}
         if self._count == 0:
             return log
-        time, airspeed, *wow, elevator, aileron, rudder, throttle, ready, stage, phase, pitot, tilt, reading = (
-            np.frombuffer(self._numbers).reshape(self._count, -1).T.copy()
-        )
-        true, fused = _body(self._motions), _body(self._nominals)
+        ready, stage, phase, pitot, tilt, reading = _columns(self._count, self._others)
+        truths = self._truths
+        true, fused = _body([truth.motion for truth in truths]), _body(self._nominals)
         for known in fused:
             known[ready == 0.0] = np.nan
+        time, airspeed, *wow, elevator, aileron, rudder, throttle = _columns(
+            self._count, chain.from_iterable(map(_scalars, truths))
+        )
         commands = _columns(len(self._commands), chain.from_iterable(self._commands))
         held = np.diff(np.append(self._command_rows, self._count))
         command = dict(zip(Command._fields, np.repeat(commands, held, axis=1), strict=True))

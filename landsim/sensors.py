@@ -18,7 +18,7 @@ from estimator.camera import Intrinsics, PinholeCamera
 from estimator.compiled import compiled
 from estimator.mount import camera_axes, camera_position
 from estimator.so3 import Array, Vec3
-from estimator.strapdown import ImuNoise, Site, ideal_sample, unpacked
+from estimator.strapdown import ImuNoise, Site, ideal_sample_into, rows, unpacked
 from landsim.config import CameraConfig, ImuConfig, MountConfig, PitotConfig
 from landsim.earth import MEAN_RADIUS
 from landsim.runway import Runway
@@ -90,6 +90,7 @@ class Imu:
         scale = config.scale_factor * rng.standard_normal(6)
         self._rng = rng
         self._setup = np.array((*site.numbers(), dt, *scale))
+        self._rows = rows(6)
         self._count = 0
         self._last = self._last_bias.copy()
         self._draw()
@@ -109,7 +110,9 @@ class Imu:
             self._count = 0
         before, self._before = self._before, truth.motion
         count, self._count = self._count, self._count + 1
-        return _sampled(before, truth.motion, self._setup, self._errors, count, self._last)
+        sample = next(self._rows)
+        _sample(sample, before, truth.motion, self._setup, self._errors, count, self._last)
+        return sample
 
     def errors(self) -> Array:
         """What the last sample was off by, its white noise apart.
@@ -125,18 +128,17 @@ class Imu:
 
 
 @compiled
-def _sampled(before: Array, after: Array, setup: Array, errors: Array, row: int, last: Array) -> Array:
-    """A sample (6,).
+def _sample(sample: Array, before: Array, after: Array, setup: Array, errors: Array, row: int, last: Array) -> None:
+    """Write to `sample` (6,).
 
     `setup` is the site, the interval (s) and the scale factors; a row of `errors` is biases, as rates, and white noise.
     What the sample is off by as rates, but for the white noise, is left in `last` (6,).
     """
     dt = setup[5]
-    sample = ideal_sample(before, after, setup, dt)
+    ideal_sample_into(sample, before, after, setup, dt)
     for i in range(6):
         last[i] = setup[6 + i] * sample[i] / dt + errors[row, i]
         sample[i] += last[i] * dt + errors[row, 6 + i]
-    return sample
 
 
 def _white(sigma: float, rng: Generator) -> Iterator[float]:

@@ -214,7 +214,7 @@ def _fly(scenario: Scenario, start: InitialState, seeds: Sequence[SeedSequence],
                 return End("fault")
             if mains_down and settings.end == "touchdown" and faulty == math.inf:
                 return End("touchdown")
-        standing = standing + dt if stands(truth) else 0.0
+        standing = standing + dt if truth.wow_left and stands(truth) else 0.0
         if standing > STANDSTILL_TIME:
             return End("stopped")
         mount.move(command.tilt)
