@@ -107,6 +107,9 @@ def law_of(aircraft: AircraftConfig, approach: ApproachConfig, gravity: float, h
     )
 
 
+_ACQUIRE, _APPROACH, _FLARE, _ROLLOUT, _STOPPED = Phase  # an enum's attributes are looked up slowly
+
+
 class GuidanceState(NamedTuple):
     """What guidance remembers from one call to the next."""
 
@@ -133,14 +136,14 @@ def next_phase(law: Law, nav: NavState, phase: Phase) -> Phase:
     """The phase that a navigation state calls for."""
     if not nav.ready:
         return phase
-    if phase is Phase.ACQUIRE:
-        return Phase.APPROACH
-    if phase is Phase.APPROACH and wheel_height(law, nav) < law.flare_height:
-        return Phase.FLARE
-    if phase is Phase.FLARE and wheel_height(law, nav) < law.touchdown_height:
-        return Phase.ROLLOUT
-    if phase is Phase.ROLLOUT and math.hypot(nav.velocity[0], nav.velocity[1]) < law.stop_speed:
-        return Phase.STOPPED
+    if phase is _ACQUIRE:
+        return _APPROACH
+    if phase is _APPROACH and wheel_height(law, nav) < law.flare_height:
+        return _FLARE
+    if phase is _FLARE and wheel_height(law, nav) < law.touchdown_height:
+        return _ROLLOUT
+    if phase is _ROLLOUT and math.hypot(nav.velocity[0], nav.velocity[1]) < law.stop_speed:
+        return _STOPPED
     return phase
 
 
@@ -160,9 +163,9 @@ def guide(law: Law, nav: NavState, state: GuidanceState) -> tuple[Command, Guida
     Command, GuidanceState
     """
     phase = next_phase(law, nav, state.phase)
-    if phase is Phase.ACQUIRE:
+    if phase is _ACQUIRE:
         return _HANDS_OFF._replace(airspeed=law.approach_speed, tilt=law.tilt_early), state
-    if phase is Phase.ROLLOUT or phase is Phase.STOPPED:
+    if phase is _ROLLOUT or phase is _STOPPED:
         return _rollout(law, nav, phase, state)
     return _descend(law, nav, phase, state)
 
@@ -180,7 +183,7 @@ def threshold_leaves(law: Law, nav: NavState) -> bool:
 
 
 def _descend(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tuple[Command, GuidanceState]:
-    flare = phase is Phase.FLARE
+    flare = phase is _FLARE
     tilted = state.tilted or threshold_leaves(law, nav)
     speed, sink = nav.velocity[0], nav.velocity[2]
     if flare:

@@ -4,7 +4,6 @@ While the aircraft flies only references are kept; vision poses, angles, errors 
 afterwards, for all rows at once.
 """
 
-import contextlib
 from collections.abc import Iterable, Sequence
 from itertools import chain
 from operator import itemgetter
@@ -13,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimator.camera import PinholeCamera
+from estimator.compiled import compiled
 from estimator.fusion import InertialVisionFilter
 from estimator.innovation import camera_sigma
 from estimator.mount import Mount, camera_triads
@@ -286,6 +286,7 @@ def rotation_vector(rotation: Array) -> Array:
     return np.asarray(vector * scale[:, None])
 
 
+@compiled
 def normalised_squares(error: Array, covariance: Array, leading: int) -> tuple[Array, Array]:
     """Errors squared over their covariance, eᵀ P⁻¹ e: of the leading ones, and of all.
 
@@ -302,27 +303,25 @@ def normalised_squares(error: Array, covariance: Array, leading: int) -> tuple[A
     (n,), (n,) array
         NaN where a covariance is not positive definite.
     """
-    # in units of the standard deviations: metres beside rad/s would cost ten digits
-    with np.errstate(all="ignore"):
-        deviation = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
-        scaled = error / deviation
-        correlation = covariance / (deviation[:, :, None] * deviation[:, None, :])
-    factor = _cholesky(correlation)
-    solved = np.empty_like(scaled)
-    for i in range(scaled.shape[1]):
-        known = (factor[:, i, :i] * solved[:, :i]).sum(axis=1)
-        solved[:, i] = (scaled[:, i] - known) / factor[:, i, i]
-    squares = np.cumsum(solved**2, axis=1)
-    return squares[:, leading - 1], squares[:, -1]
-
-
-def _cholesky(matrices: Array) -> Array:
-    """Lower factors (n, k, k); NaN where a matrix has none."""
-    try:
-        return np.asarray(np.linalg.cholesky(matrices), dtype=float)
-    except np.linalg.LinAlgError:
-        result = np.full_like(matrices, np.nan)
-        for i, matrix in enumerate(matrices):
-            with contextlib.suppress(np.linalg.LinAlgError):
-                result[i] = np.linalg.cholesky(matrix)
-        return result
+    n, k = error.shape
+    root, solved = np.zeros((k, k)), np.empty(k)
+    first, every = np.full(n, np.nan), np.full(n, np.nan)
+    for row in range(n):
+        P, total, partial = covariance[row], 0.0, 0.0
+        for i in range(k):
+            solved[i] = error[row, i] / np.sqrt(P[i, i])
+            for j in range(i + 1):
+                # in units of the standard deviations: metres beside rad/s would cost ten digits
+                rest = P[i, j] / (np.sqrt(P[i, i]) * np.sqrt(P[j, j]))
+                for m in range(j):
+                    rest -= root[i, m] * root[j, m]
+                root[i, j] = rest / root[j, j] if j < i else np.sqrt(rest)
+            for j in range(i):
+                solved[i] -= root[i, j] * solved[j]
+            solved[i] /= root[i, i]
+            total += solved[i] * solved[i]
+            if i == leading - 1:
+                partial = total
+        if np.isfinite(total):
+            first[row], every[row] = partial, total
+    return first, every
