@@ -10,6 +10,7 @@ R_true = exp([ψ×]) R_estimated.
 """
 
 from collections.abc import Iterator
+from itertools import chain, repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -219,8 +220,7 @@ def advance_into(
 
 def rows(width: int) -> Iterator[Array]:
     """Arrays (width,) without end, to be written to; made many at a time, which is cheaper than one by one."""
-    while True:
-        yield from np.empty((256, width))
+    return chain.from_iterable(np.empty((256, width)) for _ in repeat(None))
 
 
 @compiled

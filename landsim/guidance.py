@@ -129,7 +129,9 @@ INITIAL = GuidanceState(Phase.ACQUIRE, 0.0, 0.0, 0.0, False)
 
 def wheel_height(law: Law, nav: NavState) -> float:
     """Height of the midpoint of the main wheels, unloaded, above the runway, m."""
-    return -nav.position[2] - rotate(nav.R_runway_from_body, law.wheels)[2]
+    x, y, z = law.wheels
+    R = nav.R_runway_from_body
+    return -nav.position[2] - (R[6] * x + R[7] * y + R[8] * z)
 
 
 def next_phase(law: Law, nav: NavState, phase: Phase) -> Phase:
@@ -182,6 +184,11 @@ def threshold_leaves(law: Law, nav: NavState) -> bool:
     return below_horizon > law.half_view + law.tilt_early - nav.pitch
 
 
+def _within(least: float, value: float, most: float) -> float:
+    """The value, held between two limits; `most` for one that is not a number."""
+    return (least if value < least else value) if value < most else most
+
+
 def _descend(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tuple[Command, GuidanceState]:
     flare = phase is _FLARE
     tilted = state.tilted or threshold_leaves(law, nav)
@@ -191,13 +198,13 @@ def _descend(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tup
     else:
         above = -nav.position[2] - (law.aim_point - nav.position[0]) * law.slope
         wanted = speed * law.slope + law.height_gain * above
-    wanted = max(-law.max_sink, min(law.max_sink, wanted))
+    wanted = _within(-law.max_sink, wanted, law.max_sink)
     error = sink - wanted
-    integral = max(-law.integral_max, min(law.integral_max, state.sink_integral + error * law.dt))
+    integral = _within(-law.integral_max, state.sink_integral + error * law.dt, law.integral_max)
     airspeed = max(nav.airspeed, 0.5 * law.approach_speed)
     alpha = law.trim_alpha + law.trim_alpha_slope * (airspeed - law.approach_speed)
     pitch = alpha - wanted / airspeed + law.pitch_gain * error + law.pitch_integral * integral
-    pitch = max(law.pitch_min, min(law.pitch_max, pitch))
+    pitch = _within(law.pitch_min, pitch, law.pitch_max)
     command = Command(
         engaged=True,
         pitch=pitch,
@@ -222,16 +229,16 @@ def bank_command(law: Law, cross: float, cross_speed: float) -> float:
     cross_speed : float
         m/s, to the right.
     """
-    wanted = max(-law.lateral_speed_max, min(law.lateral_speed_max, -law.lateral_gain * cross))
+    wanted = _within(-law.lateral_speed_max, -law.lateral_gain * cross, law.lateral_speed_max)
     bank = math.atan(law.bank_gain * (wanted - cross_speed) / law.gravity)
-    return max(-law.bank_max, min(law.bank_max, bank))
+    return _within(-law.bank_max, bank, law.bank_max)
 
 
 def steering_command(law: Law, cross: float, yaw: float, yaw_rate: float) -> float:
     """Nose wheel and rudder, -1 to 1, right positive, that hold the centreline on the ground."""
-    heading = max(-law.heading_max, min(law.heading_max, -law.heading_gain * cross))
+    heading = _within(-law.heading_max, -law.heading_gain * cross, law.heading_max)
     steering = law.steering_gain * (heading - yaw) - law.yaw_rate_gain * yaw_rate
-    return max(-1.0, min(1.0, steering))
+    return _within(-1.0, steering, 1.0)
 
 
 def _rollout(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tuple[Command, GuidanceState]:

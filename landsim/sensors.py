@@ -6,6 +6,7 @@ do.
 
 import math
 from collections.abc import Iterator
+from itertools import chain, repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -143,8 +144,7 @@ def _sample(sample: Array, before: Array, after: Array, setup: Array, errors: Ar
 
 def _white(sigma: float, rng: Generator) -> Iterator[float]:
     """White noise without end, drawn a block at a time."""
-    while True:
-        yield from (sigma * rng.standard_normal(BLOCK)).tolist()
+    return chain.from_iterable((sigma * rng.standard_normal(BLOCK)).tolist() for _ in repeat(None))
 
 
 class Pitot:
