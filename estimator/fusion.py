@@ -5,7 +5,9 @@ and its covariance at the rate of the camera.  After each update the error is ta
 zero.
 """
 
-from typing import NamedTuple
+import math
+import types
+from typing import Any, NamedTuple
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
@@ -13,10 +15,11 @@ from filterpy.kalman import ExtendedKalmanFilter
 from estimator import strapdown
 from estimator.alignment import Start
 from estimator.camera import PinholeCamera
+from estimator.compiled import compiled
 from estimator.innovation import Eye, Innovation, frame_innovation
 from estimator.mount import Mount
 from estimator.so3 import Array
-from estimator.strapdown import ImuNoise, Inertial, Site, advance, corrected, inertial, transition
+from estimator.strapdown import ImuNoise, Inertial, Site, advance_into, corrected, inertial, predicted, rows
 
 
 class Gates(NamedTuple):
@@ -41,11 +44,63 @@ class Update(NamedTuple):
 NO_UPDATE = Update(0, float("nan"), False)
 
 
-class _ErrorFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy has no types
-    """filterpy's filter of an error that is zero whenever it is predicted."""
+@compiled
+def _cholesky_inverse(matrix: Array) -> Array:
+    """The inverse of a symmetric, positive definite matrix (n, n); NaN where it is neither."""
+    n = matrix.shape[0]
+    root, result = np.zeros((n, n)), np.empty((n, n))
+    for i in range(n):  # the inverse of the lower factor, row by row, next to the factor itself
+        for j in range(i + 1):
+            rest = matrix[i, j]
+            for k in range(j):
+                rest -= root[i, k] * root[j, k]
+            root[i, j] = rest / root[j, j] if j < i else np.sqrt(rest)
+    back = np.zeros((n, n))
+    for j in range(n):
+        back[j, j] = 1.0 / root[j, j]
+        for i in range(j + 1, n):
+            rest = 0.0
+            for k in range(j, i):
+                rest -= root[i, k] * back[k, j]
+            back[i, j] = rest / root[i, i]
+    for i in range(n):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(i, n):
+                total += back[k, i] * back[k, j]
+            result[i, j] = result[j, i] = total
+    return result
 
-    def predict_x(self, _: float = 0.0) -> None:
-        """Leave the error at zero, where every update leaves it."""
+
+class _Inverse:
+    """What stands for scipy.linalg in filterpy's update, which asks it for one thing."""
+
+    @staticmethod
+    def inv(matrix: Array) -> Array:
+        """The inverse of an innovation's covariance (n, n).
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If it has none.
+        """
+        result = _cholesky_inverse(matrix)
+        # one that is positive but for rounding has no Cholesky factor
+        return result if math.isfinite(result[0, 0]) else np.asarray(np.linalg.inv(matrix), dtype=float)
+
+
+def _update_of(base: type[Any]) -> Any:
+    """The update of filterpy as it stands, but for scipy's inverse, whose checks take as long as all the rest."""
+    update = base.update
+    return types.FunctionType(
+        update.__code__, {**update.__globals__, "linalg": _Inverse}, "update", update.__defaults__, update.__closure__
+    )
+
+
+class _ErrorFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy has no types
+    """filterpy's filter of an error that is zero before every update."""
+
+    update = _update_of(ExtendedKalmanFilter)
 
 
 class InertialVisionFilter:
@@ -87,6 +142,7 @@ class InertialVisionFilter:
         self._gates = gates
         self.nominal = start.state.numbers()
         self.bias = np.zeros(6)
+        self._rows = rows(strapdown.NOMINAL)
         self._ekf = _ErrorFilter(dim_x=strapdown.STATES, dim_z=6)
         self._zero = np.zeros(strapdown.STATES)
         self._ekf.x = self._zero
@@ -105,10 +161,17 @@ class InertialVisionFilter:
         result: Array = self._ekf.P
         return result
 
-    def propagate(self, sample: Array, dt: float) -> None:
-        """Carry the nominal state on by one interval, whose sample (6,) is as `strapdown.advance` takes it."""
-        self.nominal = advance(self.nominal, self.bias, sample, self._site, dt)
+    def propagate(self, sample: Array, dt: float) -> tuple[float, float]:
+        """Carry the nominal state on by one interval, whose sample (6,) is as `strapdown.advance` takes it.
+
+        Returns
+        -------
+        roll, pitch : float
+            Of the body, at its end, rad.
+        """
+        before, self.nominal = self.nominal, next(self._rows)
         self._elapsed += dt
+        return advance_into(self.nominal, before, self.bias, sample, self._site, dt)
 
     def predict(self) -> None:
         """Carry the covariance on to the nominal state's time."""
@@ -119,10 +182,8 @@ class InertialVisionFilter:
         if abs(dt - self._noise_dt) > 1e-9:
             self._noise_dt = dt
             ekf.Q = strapdown.process_noise(self._noise, dt)
-        ekf.F = transition(self.nominal, dt)
-        ekf.predict()
+        self.nominal, ekf.P = predicted(self.nominal, ekf.P, ekf.Q, dt)
         self._elapsed = 0.0
-        self.nominal = corrected(self.nominal, self._zero)
 
     def observe(self, lines: Array, tilt: float) -> Update:
         """Correct the state by one frame, if it passes the gate.  `predict` comes first.
@@ -155,16 +216,23 @@ class InertialVisionFilter:
         before = ekf.P
         # z and Hx are those of an error of zero: the innovation stands for their difference
         ekf.update(0.0, lambda _: H, _no_error, residual=lambda _z, _hx: y)
-        nis = float(np.dot(y, np.dot(ekf.SI, y)))
+        nis, nominal, bias = _taken_in(y, ekf.SI, ekf.x, self.nominal, self.bias)
+        ekf.x = self._zero
         if not nis <= gate:
             ekf.P = before
-            ekf.x = self._zero
             return Update(len(y), nis, False)
-        error = ekf.x
-        self.nominal = corrected(self.nominal, error)
-        self.bias = self.bias + error[9:]
-        ekf.x = self._zero
+        self.nominal, self.bias = nominal, bias
         return Update(len(y), nis, True)
+
+
+@compiled
+def _taken_in(y: Array, SI: Array, error: Array, nominal: Array, bias: Array) -> tuple[float, Array, Array]:
+    """The normalised innovation squared, and the nominal state (18,) and the biases (6,) with the error taken in."""
+    nis = 0.0
+    for i in range(len(y)):
+        for j in range(len(y)):
+            nis += y[i] * SI[i, j] * y[j]
+    return nis, corrected(nominal, error), bias + error[9:]
 
 
 def _no_error(_: Array) -> float:

@@ -9,6 +9,8 @@ Errors are true less estimated; that of the attitude is a rotation vector ψ in 
 R_true = exp([ψ×]) R_estimated.
 """
 
+from collections.abc import Iterator
+from itertools import chain, repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -192,27 +194,52 @@ def advance(nominal: Array, bias: Array, sample: Array, site: Array, dt: float) 
     (18,) array
         At the interval's end.
     """
+    result = np.empty(NOMINAL)
+    advance_into(result, nominal, bias, sample, site, dt)
+    return result
+
+
+@compiled
+def advance_into(
+    result: Array, nominal: Array, bias: Array, sample: Array, site: Array, dt: float
+) -> tuple[float, float]:
+    """Write to `result` (18,) what `advance` gives; return the roll and the pitch (rad) there."""
     place = Site(site[0], (site[1], site[2], site[3]), site[4])
     angle = (sample[0] - bias[0] * dt, sample[1] - bias[1] * dt, sample[2] - bias[2] * dt)
     velocity = (sample[3] - bias[3] * dt, sample[4] - bias[4] * dt, sample[5] - bias[5] * dt)
     moved, force = propagate(unpacked(nominal), place, angle, velocity, dt)
-    result = np.empty(NOMINAL)
     for i in range(3):
         result[i] = moved.position[i]
         result[3 + i] = moved.velocity[i]
         result[15 + i] = nominal[15 + i] + force[i]
     for i in range(9):
         result[6 + i] = moved.attitude[i]
-    return result
+    roll, pitch, _ = to_euler(moved.attitude)
+    return roll, pitch
+
+
+def rows(width: int) -> Iterator[Array]:
+    """Arrays (width,) without end, to be written to; made many at a time, which is cheaper than one by one."""
+    return chain.from_iterable(np.empty((256, width)) for _ in repeat(None))
 
 
 @compiled
 def ideal_sample(before: Array, after: Array, site: Array, dt: float) -> Array:
     """What an ideal inertial unit reports between two states (15 or more,), as `increments`: (6,) array."""
+    result = np.empty(6)
+    ideal_sample_into(result, before, after, site, dt)
+    return result
+
+
+@compiled
+def ideal_sample_into(result: Array, before: Array, after: Array, site: Array, dt: float) -> None:
+    """Write to `result` (6,) what `ideal_sample` gives."""
     place = Site(site[0], (site[1], site[2], site[3]), site[4])
     start, end = unpacked(before), unpacked(after)
     angle, velocity = increments(start.position, start.velocity, start.attitude, end.velocity, end.attitude, place, dt)
-    return np.array((angle[0], angle[1], angle[2], velocity[0], velocity[1], velocity[2]))
+    for i in range(3):
+        result[i] = angle[i]
+        result[3 + i] = velocity[i]
 
 
 @compiled
@@ -256,6 +283,48 @@ def transition(nominal: Array, dt: float) -> Array:
         for j in range(3):
             result[i, 6 + j] = half * result[3 + i, 6 + j]
     return result
+
+
+@compiled
+def predicted(nominal: Array, covariance: Array, noise: Array, dt: float) -> tuple[Array, Array]:
+    """Covariance of the errors over several intervals of the inertial unit, F P Fᵀ + Q with F as `transition`.
+
+    Three quarters of F are zero, and the rows of a product that they would add to are left out.
+
+    Parameters
+    ----------
+    nominal : (18,) array
+        At the end of the time, with the specific force integrated over it.
+    covariance : (15, 15) array
+        P, symmetric, at the beginning of the time.
+    noise : (15, 15) array
+        Q.
+    dt : float
+        s.
+
+    Returns
+    -------
+    (18,), (15, 15) array
+        The nominal state with no specific force any more, and the covariance at the end of the time.
+    """
+    F = transition(nominal, dt)
+    half, result = np.zeros((STATES, STATES)), noise.copy()
+    _add_product(half, F, covariance)
+    _add_product(result, F, half.T.copy())  # F (F P)ᵀ = F P Fᵀ
+    moved = nominal.copy()
+    moved[15:] = 0.0
+    return moved, result
+
+
+@compiled
+def _add_product(result: Array, sparse: Array, matrix: Array) -> None:
+    """Add the product of two matrices (15, 15), of which the first is mostly zero, to a third."""
+    for i in range(STATES):
+        for k in range(STATES):
+            factor = sparse[i, k]
+            if factor != 0.0:
+                for j in range(STATES):
+                    result[i, j] += factor * matrix[k, j]
 
 
 def process_noise(noise: ImuNoise, dt: float) -> Array:

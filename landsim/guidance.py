@@ -107,6 +107,9 @@ def law_of(aircraft: AircraftConfig, approach: ApproachConfig, gravity: float, h
     )
 
 
+_ACQUIRE, _APPROACH, _FLARE, _ROLLOUT, _STOPPED = Phase  # an enum's attributes are looked up slowly
+
+
 class GuidanceState(NamedTuple):
     """What guidance remembers from one call to the next."""
 
@@ -126,21 +129,23 @@ INITIAL = GuidanceState(Phase.ACQUIRE, 0.0, 0.0, 0.0, False)
 
 def wheel_height(law: Law, nav: NavState) -> float:
     """Height of the midpoint of the main wheels, unloaded, above the runway, m."""
-    return -nav.position[2] - rotate(nav.R_runway_from_body, law.wheels)[2]
+    x, y, z = law.wheels
+    R = nav.R_runway_from_body
+    return -nav.position[2] - (R[6] * x + R[7] * y + R[8] * z)
 
 
 def next_phase(law: Law, nav: NavState, phase: Phase) -> Phase:
     """The phase that a navigation state calls for."""
     if not nav.ready:
         return phase
-    if phase is Phase.ACQUIRE:
-        return Phase.APPROACH
-    if phase is Phase.APPROACH and wheel_height(law, nav) < law.flare_height:
-        return Phase.FLARE
-    if phase is Phase.FLARE and wheel_height(law, nav) < law.touchdown_height:
-        return Phase.ROLLOUT
-    if phase is Phase.ROLLOUT and math.hypot(nav.velocity[0], nav.velocity[1]) < law.stop_speed:
-        return Phase.STOPPED
+    if phase is _ACQUIRE:
+        return _APPROACH
+    if phase is _APPROACH and wheel_height(law, nav) < law.flare_height:
+        return _FLARE
+    if phase is _FLARE and wheel_height(law, nav) < law.touchdown_height:
+        return _ROLLOUT
+    if phase is _ROLLOUT and math.hypot(nav.velocity[0], nav.velocity[1]) < law.stop_speed:
+        return _STOPPED
     return phase
 
 
@@ -160,9 +165,9 @@ def guide(law: Law, nav: NavState, state: GuidanceState) -> tuple[Command, Guida
     Command, GuidanceState
     """
     phase = next_phase(law, nav, state.phase)
-    if phase is Phase.ACQUIRE:
+    if phase is _ACQUIRE:
         return _HANDS_OFF._replace(airspeed=law.approach_speed, tilt=law.tilt_early), state
-    if phase is Phase.ROLLOUT or phase is Phase.STOPPED:
+    if phase is _ROLLOUT or phase is _STOPPED:
         return _rollout(law, nav, phase, state)
     return _descend(law, nav, phase, state)
 
@@ -179,8 +184,13 @@ def threshold_leaves(law: Law, nav: NavState) -> bool:
     return below_horizon > law.half_view + law.tilt_early - nav.pitch
 
 
+def _within(least: float, value: float, most: float) -> float:
+    """The value, held between two limits; `most` for one that is not a number."""
+    return (least if value < least else value) if value < most else most
+
+
 def _descend(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tuple[Command, GuidanceState]:
-    flare = phase is Phase.FLARE
+    flare = phase is _FLARE
     tilted = state.tilted or threshold_leaves(law, nav)
     speed, sink = nav.velocity[0], nav.velocity[2]
     if flare:
@@ -188,13 +198,13 @@ def _descend(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tup
     else:
         above = -nav.position[2] - (law.aim_point - nav.position[0]) * law.slope
         wanted = speed * law.slope + law.height_gain * above
-    wanted = max(-law.max_sink, min(law.max_sink, wanted))
+    wanted = _within(-law.max_sink, wanted, law.max_sink)
     error = sink - wanted
-    integral = max(-law.integral_max, min(law.integral_max, state.sink_integral + error * law.dt))
+    integral = _within(-law.integral_max, state.sink_integral + error * law.dt, law.integral_max)
     airspeed = max(nav.airspeed, 0.5 * law.approach_speed)
     alpha = law.trim_alpha + law.trim_alpha_slope * (airspeed - law.approach_speed)
     pitch = alpha - wanted / airspeed + law.pitch_gain * error + law.pitch_integral * integral
-    pitch = max(law.pitch_min, min(law.pitch_max, pitch))
+    pitch = _within(law.pitch_min, pitch, law.pitch_max)
     command = Command(
         engaged=True,
         pitch=pitch,
@@ -219,16 +229,16 @@ def bank_command(law: Law, cross: float, cross_speed: float) -> float:
     cross_speed : float
         m/s, to the right.
     """
-    wanted = max(-law.lateral_speed_max, min(law.lateral_speed_max, -law.lateral_gain * cross))
+    wanted = _within(-law.lateral_speed_max, -law.lateral_gain * cross, law.lateral_speed_max)
     bank = math.atan(law.bank_gain * (wanted - cross_speed) / law.gravity)
-    return max(-law.bank_max, min(law.bank_max, bank))
+    return _within(-law.bank_max, bank, law.bank_max)
 
 
 def steering_command(law: Law, cross: float, yaw: float, yaw_rate: float) -> float:
     """Nose wheel and rudder, -1 to 1, right positive, that hold the centreline on the ground."""
-    heading = max(-law.heading_max, min(law.heading_max, -law.heading_gain * cross))
+    heading = _within(-law.heading_max, -law.heading_gain * cross, law.heading_max)
     steering = law.steering_gain * (heading - yaw) - law.yaw_rate_gain * yaw_rate
-    return max(-1.0, min(1.0, steering))
+    return _within(-1.0, steering, 1.0)
 
 
 def _rollout(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tuple[Command, GuidanceState]:

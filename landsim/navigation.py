@@ -11,14 +11,14 @@ import numpy as np
 
 from estimator.alignment import Alignment, Incidence
 from estimator.camera import PinholeCamera
-from estimator.compiled import compiled
+from estimator.compiled import compiled, rotate_back
 from estimator.covariance import LEFT, RIGHT, THRESHOLD
 from estimator.fusion import NO_UPDATE, Gates, InertialVisionFilter, Update
 from estimator.innovation import Eye, Innovation, frame_innovation
 from estimator.lines import unguarded_variances
 from estimator.mount import Mount, body_from_camera, camera_axes
-from estimator.so3 import IDENTITY, Array, Mat3, Vec3, rotate_back
-from estimator.strapdown import ImuNoise, Inertial, Site, euler, inertial
+from estimator.so3 import IDENTITY, Array
+from estimator.strapdown import ImuNoise, Inertial, Site, euler, unpacked
 from estimator.three_line import three_line_pose
 from landsim.config import MountConfig, NavigationConfig
 from landsim.state import CameraFrame, ImuSample, NavState, Stage
@@ -100,6 +100,8 @@ class Navigator:
         self._rejected = 0
         self.airspeed = NAN
         self._sample = np.zeros(6)
+        self._angles: tuple[float, float] | None = None
+        self._earth_rate = np.array(site.earth_rate)
         self._latch = config.handover == "latched"
         self._late = False
         self.stage = Stage.NONE
@@ -121,22 +123,16 @@ class Navigator:
         if self.filter is None:
             self._alignment.propagate(sample, self._dt)
         else:
-            self.filter.propagate(sample, self._dt)
+            self._angles = self.filter.propagate(sample, self._dt)
 
     def observe(self, frame: CameraFrame) -> FrameResult:
         """Take in a camera frame."""
-        lines = _observed(frame.lines, self._noise_px)
+        self._angles = None  # as they will be known after the frame
         if self.filter is None:
-            return self._align(lines, frame.tilt)
+            return self._align(_observed(frame.lines, self._noise_px), frame.tilt)
         self.filter.predict()
-        roll = NAN
-        if self._latch:
-            self._late = self._late or threshold_has_left(lines)
-            if self._late:
-                lines[THRESHOLD] = NAN
-        if math.isnan(lines[THRESHOLD, 0]):
-            right, down, _ = camera_axes(self.filter.state.attitude, frame.tilt)
-            roll = math.atan2(right[2], down[2])
+        lines, self._late, borrows = _without_threshold(frame.lines, self._noise_px, self._latch, self._late)
+        roll = _camera_roll(self.filter.nominal, frame.tilt) if borrows else NAN
         update = self.filter.observe(lines, frame.tilt)
         if update.degrees > 0:
             self._rejected = 0 if update.accepted else self._rejected + 1
@@ -175,8 +171,9 @@ class Navigator:
         if self.filter is None:
             return None
         p = self.filter.covariance
-        sigma2 = float(p[0, 0]) + float(p[1, 1]) + float(p[2, 2])
-        x, y, z = self.filter.nominal[:3].tolist()
+        nominal = self.filter.nominal
+        sigma2 = p.item(0, 0) + p.item(1, 1) + p.item(2, 2)
+        x, y, z = nominal.item(0), nominal.item(1), nominal.item(2)
         if not math.isfinite(sigma2 + x + y + z):
             return "its numbers are not finite"
         if sigma2 > self._config.max_position_sigma_m**2:
@@ -207,40 +204,33 @@ class Navigator:
 
     def roll_and_pitch(self) -> tuple[float, float]:
         """Of the body, rad: what the inner loops need between two calls of guidance."""
-        roll, pitch, _ = euler(self.nominal)
-        return roll, pitch
+        if self._angles is None:
+            roll, pitch, _ = euler(self.nominal)
+            self._angles = roll, pitch
+        return self._angles
 
     def state(self, time: float) -> NavState:
         """What guidance is given."""
-        nominal = self.nominal
-        position, velocity, attitude = inertial(nominal)
-        roll, pitch, yaw = euler(nominal)
+        running = self.filter
+        bias = _NO_BIAS if running is None else running.bias
+        n = _known(self.nominal, bias, self._sample, self._earth_rate, self._dt).tolist()
         return NavState(
             time,
-            self.filter is not None,
-            position,
-            velocity,
-            attitude,
-            roll,
-            pitch,
-            yaw,
-            self._body_rate(attitude),
+            running is not None,
+            (n[0], n[1], n[2]),
+            (n[3], n[4], n[5]),
+            (n[6], n[7], n[8], n[9], n[10], n[11], n[12], n[13], n[14]),
+            n[15],
+            n[16],
+            n[17],
+            (n[18], n[19], n[20]),
             self.airspeed,
             self.stage,
         )
 
-    def _body_rate(self, attitude: Mat3) -> Vec3:
-        """Relative to the ground, less the estimated bias, rad/s."""
-        x, y, z, *_ = self._sample.tolist()
-        dt = self._dt
-        if self.filter is None:
-            return x / dt, y / dt, z / dt
-        p, q, r, *_ = self.filter.bias.tolist()
-        earth = rotate_back(attitude, self._site.earth_rate)
-        return x / dt - p - earth[0], y / dt - q - earth[1], z / dt - r - earth[2]
-
 
 _UNKNOWN = Inertial((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), IDENTITY).numbers()
+_NO_BIAS = np.zeros(6)
 
 
 _variances = compiled(unguarded_variances)
@@ -255,6 +245,40 @@ def _observed(readings: Array, noise_px: float) -> Array:
     return result
 
 
-def threshold_has_left(lines: Array) -> bool:
-    """Whether a frame (3, 7) shows both edges and no threshold."""
-    return not math.isnan(lines[LEFT, 0] + lines[RIGHT, 0]) and math.isnan(lines[THRESHOLD, 0])
+@compiled
+def _without_threshold(readings: Array, noise_px: float, latch: bool, late: bool) -> tuple[Array, bool, bool]:
+    """As `_observed`, whether the threshold is left out of account from now on, and whether the lines do without it.
+
+    With `latch` the threshold is left out from the first frame on that shows both edges and no threshold.
+    """
+    lines = _observed(readings, noise_px)
+    missing = math.isnan(lines[THRESHOLD, 0])
+    if latch:
+        late = late or (missing and not math.isnan(lines[LEFT, 0] + lines[RIGHT, 0]))
+        if late:
+            lines[THRESHOLD] = NAN
+            missing = True
+    return lines, late, missing
+
+
+@compiled
+def _camera_roll(nominal: Array, tilt: float) -> float:
+    """Roll of the camera triad (rad), with the mount angle as read."""
+    right, down, _ = camera_axes(unpacked(nominal).attitude, tilt)
+    return math.atan2(right[2], down[2])
+
+
+@compiled
+def _known(nominal: Array, bias: Array, sample: Array, earth_rate: Array, dt: float) -> Array:
+    """What `NavState` says of the motion (21,): position, velocity, attitude, Euler angles and body rates.
+
+    The rates are those relative to the ground: of the inertial unit's last sample, less bias and the Earth's rotation.
+    """
+    earth = rotate_back(unpacked(nominal).attitude, (earth_rate[0], earth_rate[1], earth_rate[2]))
+    angles = euler(nominal)
+    result = np.empty(21)
+    result[:15] = nominal[:15]
+    for i in range(3):
+        result[15 + i] = angles[i]
+        result[18 + i] = sample[i] / dt - bias[i] - earth[i]
+    return result

@@ -20,7 +20,7 @@ import numpy as np
 
 from estimator.compiled import compiled
 from estimator.so3 import Array, Vec3, rotate, rotate_back
-from estimator.strapdown import inertial
+from estimator.strapdown import inertial, rows
 from landsim.attitude import runway_attitude
 from landsim.errors import InputError
 from landsim.runway import Runway
@@ -254,6 +254,7 @@ class Plant:
                 *(runway.latitude, runway.longitude, runway.heading),
             )
         )
+        self._rows = rows(15)
         self._dt = 1.0 / rate_hz
         self._steps = 0
         self._started = False
@@ -458,32 +459,39 @@ class Plant:
             x, y, z, altitude, latitude, longitude, vx, vy, vz, phi, theta, psi, airspeed,
             elevator, aileron, rudder, throttle, thrust,
         ) = [read() for read in self._read]  # fmt: skip
-        motion, down, cosine = _motion(self._site, x, y, z, vx, vy, vz, latitude, longitude, phi, theta, psi)
+        motion = next(self._rows)
+        down, cosine = _motion(motion, self._site, x, y, z, vx, vy, vz, latitude, longitude, phi, theta, psi)
         nose = left = right = touching = False
         if down > -CONTACT_HEIGHT:
             # here the ellipsoid's normal through the aircraft meets the runway's plane
             self._set_terrain(altitude + down / (FT * cosine))
-            nose, left, right = [read() != 0.0 for read in self._wheels]
-            touching = any([read() != 0.0 for read in self._structure])  # noqa: C419 (a list is faster)
+            on_nose, on_left, on_right = self._wheels
+            nose, left, right = on_nose() != 0.0, on_left() != 0.0, on_right() != 0.0
+            for touches in self._structure:
+                if touches() != 0.0:
+                    touching = True
         if self._loading.cg_forward != 0.0:
             # from the centre of gravity, which JSBSim tells of, back to where it nominally is
             back, (yawing, pitching) = -self._loading.cg_forward, [read() for read in self._turn]
             attitude = inertial(motion).attitude
             motion[:3] += rotate(attitude, (back, 0.0, 0.0))
             motion[3:6] += rotate(attitude, (0.0, back * yawing, -back * pitching))
-        return Truth(
-            self._steps * self._dt,
-            motion,
-            FT * airspeed,
-            nose,
-            left,
-            right,
-            touching,
-            elevator,
-            aileron,
-            rudder,
-            throttle,
-            LBF * thrust,
+        return tuple.__new__(  # what Truth(...) does, at half the price
+            Truth,
+            (
+                self._steps * self._dt,
+                motion,
+                FT * airspeed,
+                nose,
+                left,
+                right,
+                touching,
+                elevator,
+                aileron,
+                rudder,
+                throttle,
+                LBF * thrust,
+            ),
         )
 
 
@@ -492,6 +500,7 @@ _attitude = compiled(runway_attitude)
 
 @compiled
 def _motion(
+    motion: Array,
     site: Array,
     x: float,
     y: float,
@@ -504,18 +513,17 @@ def _motion(
     phi: float,
     theta: float,
     psi: float,
-) -> tuple[Array, float, float]:
-    """From JSBSim's position and velocity (ECEF, ft) and angles (rad) to `Truth.motion`.
+) -> tuple[float, float]:
+    """Write to `motion`, which is `Truth.motion`, from JSBSim's position and velocity (ECEF, ft) and angles (rad).
 
-    `site` is R_runway_from_ecef times a foot, the origin in its axes (m), latitude, longitude and heading.  Given
-    besides are the z of the position (m) and the cosine of the angle between the verticals.
+    `site` is R_runway_from_ecef times a foot, the origin in its axes (m), latitude, longitude and heading.  Returned
+    are the z of the position (m) and the cosine of the angle between the verticals.
     """
     cosine, attitude = _attitude(site[12], site[13], site[14], latitude, longitude, phi, theta, psi)
-    motion = np.empty(15)
     for i in range(3):
         a, b, c = site[3 * i], site[3 * i + 1], site[3 * i + 2]
         motion[i] = a * x + b * y + c * z - site[9 + i]
         motion[3 + i] = a * vx + b * vy + c * vz
     for i in range(9):
         motion[6 + i] = attitude[i]
-    return motion, motion[2], cosine
+    return motion[2], cosine

@@ -4,7 +4,6 @@ While the aircraft flies only references are kept; vision poses, angles, errors 
 afterwards, for all rows at once.
 """
 
-import contextlib
 from collections.abc import Iterable, Sequence
 from itertools import chain
 from operator import itemgetter
@@ -13,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimator.camera import PinholeCamera
+from estimator.compiled import compiled
 from estimator.fusion import InertialVisionFilter
 from estimator.innovation import camera_sigma
 from estimator.mount import Mount, camera_triads
@@ -52,8 +52,14 @@ _SCALARS = ("time", "airspeed", "wow_nose", "wow_left", "wow_right", "elevator",
 _scalars = itemgetter(*(Truth._fields.index(name) for name in _SCALARS))
 
 
+def _stacked(arrays: Sequence[Array]) -> Array:
+    """Arrays of one shape (...) as one, (n, ...)."""
+    joined = bytearray().join(arrays)  # type: ignore[arg-type]  # arrays are buffers, which only newer stubs know
+    return np.frombuffer(joined).reshape(len(arrays), *arrays[0].shape)
+
+
 def _body(motions: Sequence[Array]) -> Body:
-    rows = np.concatenate(motions).reshape(len(motions), -1)
+    rows = _stacked(motions)
     return Body(rows[:, :3], rows[:, 3:6], rows[:, 6:15].reshape(-1, 3, 3))
 
 
@@ -95,8 +101,10 @@ class Recorder:
         self._wheels = wheels
         self._truths: list[Truth] = []
         self._nominals: list[Array] = []
-        self._commands: list[Command] = []
         self._others: list[float] = []
+        self._commands: list[Command] = []
+        self._command_rows: list[int] = []
+        self._command: Command | None = None
         self._count = 0
         self._frames: list[float] = []
         self._frame_rows: list[int] = []
@@ -120,10 +128,13 @@ class Recorder:
     ) -> None:
         """Take down a step; the frame of the same step comes before it."""
         nominal, ready, stage = navigator.nominal, navigator.ready, navigator.stage  # a plug-in's may raise
+        if command is not self._command:
+            self._command = command
+            self._commands.append(command)
+            self._command_rows.append(self._count)
         self._count += 1
         self._truths.append(truth)
         self._nominals.append(nominal)
-        self._commands.append(command)
         self._others += (ready, stage, phase, pitot, tilt, reading)
 
     def frame(self, view: View, result: FrameResult, running: InertialVisionFilter | Belief | None, imu: Imu) -> None:
@@ -154,7 +165,9 @@ class Recorder:
         time, airspeed, *wow, elevator, aileron, rudder, throttle = _columns(
             self._count, chain.from_iterable(map(_scalars, truths))
         )
-        command = dict(zip(Command._fields, _columns(self._count, chain.from_iterable(self._commands)), strict=True))
+        commands = _columns(len(self._commands), chain.from_iterable(self._commands))
+        held = np.diff(np.append(self._command_rows, self._count))
+        command = dict(zip(Command._fields, np.repeat(commands, held, axis=1), strict=True))
 
         log["time_s"] = time
         log["phase"], log["stage"] = phase, stage
@@ -199,12 +212,12 @@ class Recorder:
         measured = frame["nis_dof"] > 0.0
         for name in ("nis_dof", "nis", "accepted"):
             log[name][at[measured]] = frame[name][measured]
-        true_ends, seen_ends = np.array(self._true_ends), np.array(self._seen_ends)
+        true_ends, seen_ends = _stacked(self._true_ends), _stacked(self._seen_ends)
         for i, line in enumerate(LINES):
             for k, end in enumerate(ENDS):
                 log[f"{line}_true_{end}"][at] = true_ends[:, i, k]
                 log[f"{line}_seen_{end}"][at] = seen_ends[:, i, k]
-        lines = np.array(self._lines)[:, :, :3]
+        lines = _stacked(self._lines)[:, :, :3]
         lines[frame["late"] > 0.0, 1] = np.nan
         for quantity, column in zip(QUANTITIES, self._vision(lines, frame["roll"]), strict=True):
             log[f"vision_{quantity}"][at] = column
@@ -226,8 +239,8 @@ class Recorder:
         if not self._filter_rows:
             return
         at = np.array(self._filter_rows)
-        covariance = np.array(self._covariance)
-        bias, imu_error = np.array(self._bias), np.array(self._errors)
+        covariance = _stacked(self._covariance)
+        bias, imu_error = _stacked(self._bias), _stacked(self._errors)
         error = np.concatenate(
             (
                 true.position[at] - fused.position[at],
@@ -292,6 +305,7 @@ def rotation_vector(rotation: Array) -> Array:
     return np.asarray(vector * scale[:, None])
 
 
+@compiled
 def normalised_squares(error: Array, covariance: Array, leading: int) -> tuple[Array, Array]:
     """Errors squared over their covariance, eᵀ P⁻¹ e: of the leading ones, and of all.
 
@@ -308,27 +322,25 @@ def normalised_squares(error: Array, covariance: Array, leading: int) -> tuple[A
     (n,), (n,) array
         NaN where a covariance is not positive definite.
     """
-    # in units of the standard deviations: metres beside rad/s would cost ten digits
-    with np.errstate(all="ignore"):
-        deviation = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
-        scaled = error / deviation
-        correlation = covariance / (deviation[:, :, None] * deviation[:, None, :])
-    factor = _cholesky(correlation)
-    solved = np.empty_like(scaled)
-    for i in range(scaled.shape[1]):
-        known = (factor[:, i, :i] * solved[:, :i]).sum(axis=1)
-        solved[:, i] = (scaled[:, i] - known) / factor[:, i, i]
-    squares = np.cumsum(solved**2, axis=1)
-    return squares[:, leading - 1], squares[:, -1]
-
-
-def _cholesky(matrices: Array) -> Array:
-    """Lower factors (n, k, k); NaN where a matrix has none."""
-    try:
-        return np.asarray(np.linalg.cholesky(matrices), dtype=float)
-    except np.linalg.LinAlgError:
-        result = np.full_like(matrices, np.nan)
-        for i, matrix in enumerate(matrices):
-            with contextlib.suppress(np.linalg.LinAlgError):
-                result[i] = np.linalg.cholesky(matrix)
-        return result
+    n, k = error.shape
+    root, solved = np.zeros((k, k)), np.empty(k)
+    first, every = np.full(n, np.nan), np.full(n, np.nan)
+    for row in range(n):
+        P, total, partial = covariance[row], 0.0, 0.0
+        for i in range(k):
+            solved[i] = error[row, i] / np.sqrt(P[i, i])
+            for j in range(i + 1):
+                # in units of the standard deviations: metres beside rad/s would cost ten digits
+                rest = P[i, j] / (np.sqrt(P[i, i]) * np.sqrt(P[j, j]))
+                for m in range(j):
+                    rest -= root[i, m] * root[j, m]
+                root[i, j] = rest / root[j, j] if j < i else np.sqrt(rest)
+            for j in range(i):
+                solved[i] -= root[i, j] * solved[j]
+            solved[i] /= root[i, i]
+            total += solved[i] * solved[i]
+            if i == leading - 1:
+                partial = total
+        if np.isfinite(total):
+            first[row], every[row] = partial, total
+    return first, every

@@ -6,6 +6,7 @@ do.
 
 import math
 from collections.abc import Iterator
+from itertools import chain, repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from estimator.camera import Intrinsics, PinholeCamera
 from estimator.compiled import compiled
 from estimator.mount import camera_axes, camera_position
 from estimator.so3 import Array, Vec3
-from estimator.strapdown import ImuNoise, Site, ideal_sample, unpacked
+from estimator.strapdown import ImuNoise, Site, ideal_sample_into, rows, unpacked
 from landsim.config import CameraConfig, ImuConfig, MountConfig, PitotConfig
 from landsim.earth import MEAN_RADIUS
 from landsim.runway import Runway
@@ -87,20 +88,21 @@ class Imu:
         self._white = factor * np.repeat((noise.gyro, noise.accel), 3) * math.sqrt(dt)
         self._last_bias = factor * rng.standard_normal(6)
         self._last_bias *= (*[noise.gyro_bias] * 3, *[config.accel_bias_mg * MILLI_G] * 3)
-        self._scale = factor * config.scale_factor * rng.standard_normal(6)
+        scale = factor * config.scale_factor * rng.standard_normal(6)
         self._rng = rng
-        self._site = site.numbers()
+        self._setup = np.array((*site.numbers(), dt, *scale))
+        self._rows = rows(6)
         self._count = 0
-        self._last = self._last_bias
+        self._last = self._last_bias.copy()
         self._draw()
         self._before = start.motion
 
     def _draw(self) -> None:
         """The biases of the next block of samples, and their white noise."""
         drift, white = self._rng.standard_normal((2, BLOCK, 6))
-        self._bias = self._last_bias + np.cumsum(drift * self._drift, axis=0)
-        self._last_bias = self._bias[-1]
-        self._noise = white * self._white
+        bias = self._last_bias + np.cumsum(drift * self._drift, axis=0)
+        self._last_bias = bias[-1]
+        self._errors = np.concatenate((bias, white * self._white), axis=1)
 
     def sample(self, truth: Truth) -> ImuSample:
         """The increments since the last call, which was one interval ago."""
@@ -108,10 +110,9 @@ class Imu:
             self._draw()
             self._count = 0
         before, self._before = self._before, truth.motion
-        self._last, sample = _sampled(
-            before, truth.motion, self._site, self._dt, self._scale, self._bias, self._noise, self._count
-        )
-        self._count += 1
+        count, self._count = self._count, self._count + 1
+        sample = next(self._rows)
+        _sample(sample, before, truth.motion, self._setup, self._errors, count, self._last)
         return sample
 
     def errors(self) -> Array:
@@ -124,25 +125,26 @@ class Imu:
         (6,) array
             Gyros (rad/s) and accelerometers (m/s²).
         """
-        return self._last
+        return self._last.copy()
 
 
 @compiled
-def _sampled(
-    before: Array, after: Array, site: Array, dt: float, scale: Array, bias: Array, noise: Array, row: int
-) -> tuple[Array, Array]:
-    """The errors of a sample as rates (6,), but for the white noise, and the sample (6,)."""
-    sample, errors = ideal_sample(before, after, site, dt), np.empty(6)
+def _sample(sample: Array, before: Array, after: Array, setup: Array, errors: Array, row: int, last: Array) -> None:
+    """Write to `sample` (6,).
+
+    `setup` is the site, the interval (s) and the scale factors; a row of `errors` is biases, as rates, and white noise.
+    What the sample is off by as rates, but for the white noise, is left in `last` (6,).
+    """
+    dt = setup[5]
+    ideal_sample_into(sample, before, after, setup, dt)
     for i in range(6):
-        errors[i] = scale[i] * sample[i] / dt + bias[row, i]
-        sample[i] += errors[i] * dt + noise[row, i]
-    return errors, sample
+        last[i] = setup[6 + i] * sample[i] / dt + errors[row, i]
+        sample[i] += last[i] * dt + errors[row, 6 + i]
 
 
 def _white(sigma: float, rng: Generator) -> Iterator[float]:
     """White noise without end, drawn a block at a time."""
-    while True:
-        yield from (sigma * rng.standard_normal(BLOCK)).tolist()
+    return chain.from_iterable((sigma * rng.standard_normal(BLOCK)).tolist() for _ in repeat(None))
 
 
 class Pitot:

@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 
 from numpy.random import Generator, SeedSequence, default_rng
 
-from estimator.so3 import Array, Vec3, rotate
-from estimator.strapdown import inertial
+from estimator.compiled import compiled, rotate
+from estimator.so3 import Array, Vec3
+from estimator.strapdown import unpacked
 from landsim.config import Scenario
 from landsim.dispersion import dispersed, draws_of_seed
 from landsim.errors import InputError, traceback_of
@@ -216,20 +217,21 @@ def _fly(
         if diverged is not None:
             return End("diverged", diverged)
         if truth.wow_nose or truth.wow_left or truth.wow_right:
-            faulty = min(faulty, _fault_time(truth, runway, wheels, mains_down))
+            if faulty == math.inf:
+                faulty = _fault_time(truth, runway, wheels, mains_down)
             mains_down = mains_down or truth.wow_left or truth.wow_right
             if truth.time > faulty + AFTERMATH:
                 return End("fault")
             if mains_down and settings.end == "touchdown" and faulty == math.inf:
                 return End("touchdown")
-        standing = standing + dt if stands(truth) else 0.0
+        standing = standing + dt if truth.wow_left and stands(truth) else 0.0
         if standing > STANDSTILL_TIME:
             return End("stopped")
         mount.move(command.tilt)
         roll, pitch = navigator.roll_and_pitch()
         plant.feed(rate, side_force, roll, pitch, navigator.airspeed)
         truth = plant.step()
-        if truth.structure_contact or not -truth.motion[2] > BELOW_GROUND:  # the latter catches NaN
+        if truth.structure_contact or not -truth.motion.item(2) > BELOW_GROUND:  # the latter catches NaN
             return _crash(recorder, truth, navigator, command, phase, airspeed, mount.tilt, tilt_reading)
     return End("timeout")
 
@@ -239,19 +241,28 @@ _ZERO = (0.0, 0.0, 0.0)
 
 def _fault_time(truth: Truth, runway: Runway, wheels: Vec3, mains_down: bool) -> float:
     """The time, if a state on the wheels fails the landing: nose wheel first, or main wheels off the runway."""
-    position, _, attitude = inertial(truth.motion)
-    x, y, _ = rotate(attitude, wheels)
-    x, y = x + position[0], y + position[1]
-    on_it = 0.0 <= x <= runway.length and abs(y) <= 0.5 * runway.width
-    mains = truth.wow_left or truth.wow_right
-    if (truth.wow_nose and not mains_down) or (mains and not on_it):
+    if truth.wow_nose and not mains_down:
         return truth.time
-    return math.inf
+    if not (truth.wow_left or truth.wow_right):
+        return math.inf
+    on_it = _on_runway(truth.motion, *wheels, runway.length, runway.width)
+    return math.inf if on_it else truth.time
+
+
+@compiled
+def _on_runway(motion: Array, ahead: float, right: float, down: float, length: float, width: float) -> bool:
+    """Whether a point of the body is over the runway."""
+    position, _, attitude = unpacked(motion)
+    x, y, _ = rotate(attitude, (ahead, right, down))
+    x, y = x + position[0], y + position[1]
+    return 0.0 <= x <= length and abs(y) <= 0.5 * width
 
 
 def stands(truth: Truth) -> bool:
     """Whether the aircraft stands on its main wheels."""
-    return truth.wow_left and truth.wow_right and math.hypot(truth.motion[3], truth.motion[4]) < STANDSTILL
+    if not (truth.wow_left and truth.wow_right):
+        return False
+    return math.hypot(truth.motion.item(3), truth.motion.item(4)) < STANDSTILL
 
 
 def _crash(recorder: Recorder, truth: Truth, *known: Any) -> End:

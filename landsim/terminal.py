@@ -184,12 +184,12 @@ class FlightRate:
     def __init__(self, total: int, done: int, clock: Callable[[], float] = time.monotonic) -> None:
         self.total, self.done = total, done
         self.flown = self.succeeded = 0
-        self._clock = clock
+        self.clock = clock
         self._first = self._last = 0.0
 
     def add(self, *, success: bool) -> None:
         """Count a flight that has just been finished."""
-        self._last = self._clock()
+        self._last = self.clock()
         if not self.flown:
             self._first = self._last
         self.flown += 1
@@ -235,12 +235,12 @@ def flight_progress(text: str, rate: FlightRate) -> "Iterator[Callable[[bool], N
 
 @contextmanager
 def _plain_progress(text: str, rate: FlightRate) -> "Iterator[Callable[[bool], None]]":
-    last = time.monotonic()
+    last = rate.clock()
 
     def count(success: bool) -> None:
         nonlocal last
         rate.add(success=success)
-        now = time.monotonic()
+        now = rate.clock()
         if now - last >= PLAIN_EVERY_S:
             last = now
             tell(f"{text}: {rate.done} of {rate.total} flights, {rate.text()}")

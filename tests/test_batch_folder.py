@@ -11,7 +11,6 @@ import pyarrow.parquet as pq
 import pytest
 from batches import drawn, equal, fly_into, identity, made_up, same, short, table
 
-from landsim.batch import durable
 from landsim.batch.chunks import BatchStopped, Chunks
 from landsim.batch.folder import check_new, load_batch, locked, open_batch
 from landsim.batch.gather import GROUP, gather
@@ -187,7 +186,7 @@ class TestFolder:
             sync(descriptor)
 
         with monkeypatch.context() as full:
-            full.setattr(durable.os, "fsync", fsync)
+            full.setattr(os, "fsync", fsync)
             with pytest.raises(BatchStopped, match=r"parquet: cannot be written: No space left on device"):
                 fly_into(tmp_path / "b", scenario, identity(scenario, 12, chunk=2), fly=made_up)
         kept = [index for path in (tmp_path / "b" / "chunks").glob("*.parquet") for index in indices(path)]

@@ -29,7 +29,7 @@ def test_wheel_from_sdist_runs_from_anywhere(tmp_path: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     for path in [*REPOSITORY.glob("scenarios/*.toml"), *REPOSITORY.glob("aircraft/*/**/*.*")]:
         assert f"landsim/_data/{path.relative_to(REPOSITORY).as_posix()}" in names
-    assert {"landsim/py.typed", "estimator/py.typed"} <= names
+    assert {"landsim/py.typed", "estimator/py.typed", "landsim/page/templates/page.html.j2"} <= names
     assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"estimator", "landsim"}
 
     site = tmp_path / "site"

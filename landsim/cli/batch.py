@@ -14,6 +14,7 @@ from landsim.cli.common import echo_paths, load, seed_of, set_option, whole
 from landsim.cli.finish import print_batch, report, summarised
 from landsim.terminal import (
     EXIT_FAILURE,
+    EXIT_INTERRUPTED,
     FlightRate,
     fail,
     flight_progress,
@@ -53,9 +54,7 @@ no_report_option = click.option(
 )
 @click.option("--resume", is_flag=True, help="Go on with the batch in --out.")
 @click.option("--engine", type=click.Choice(ENGINES), default=ENGINES[0], help="Who flies.  [default: processes]")
-@click.option(
-    "--scheduler", metavar="ADDRESS", help="Of a Dask cluster, as tcp://host:8786.  [default: an own one]"
-)
+@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, as tcp://host:8786.  [default: an own one]")
 @click.option("--shard", metavar="I/N", help="Fly every N-th flight from the I-th on; landsim merge joins the shards.")
 @click.option(
     "--keep",
@@ -93,7 +92,7 @@ def batch(
     with --resume.
     """
     from landsim.batch.chunks import BatchStopped
-    from landsim.batch.folder import check_new, check_same, open_batch
+    from landsim.batch.folder import check_new, check_same, is_batch, open_batch
     from landsim.batch.identity import Shard, identify, read_identity
     from landsim.batch.pool import cores
     from landsim.runs import numbered_folder
@@ -142,9 +141,9 @@ def batch(
     except BatchStopped as stopped:
         fail(f"{stopped}; {_to_go_on(scenario, settings, place, engine, scheduler, workers)}", EXIT_FAILURE)
     except KeyboardInterrupt:
-        if place is not None and (place / "batch.json").is_file():
-            tell(f"interrupted; {_to_go_on(scenario, settings, place, engine, scheduler, workers)}")
-        raise
+        if place is None or not is_batch(place):
+            raise
+        fail(f"interrupted; {_to_go_on(scenario, settings, place, engine, scheduler, workers)}", EXIT_INTERRUPTED)
 
 
 @click.command()
@@ -250,14 +249,19 @@ def _fly(folder: "BatchFolder", scenario: "Scenario", engine: "Engine") -> dict[
 
 def _finish(folder: Path, scenario: "Scenario", identity: "Identity", flown: dict[str, Any], *, draw: bool) -> None:
     """Summary and report of a batch that is complete, and its tables; of a shard, nothing but where it is."""
+    from landsim.errors import RunFolderError
+
     paths: list[Path] = []
     summary = None
     if identity.shard.of == 1:
-        with status("summing up") as say:
-            summary = summarised(folder, scenario, identity, flown)
-            if draw:
-                say("drawing")
-                paths = report(folder, scenario, summary)
+        try:
+            with status("summing up") as say:
+                summary = summarised(folder, scenario, identity, flown)
+                if draw:
+                    say("drawing")
+                    paths = report(folder, scenario, summary)
+        except RunFolderError as error:
+            fail(f"{error}; every flight is kept, and landsim plot {shown(folder)} reports them", EXIT_FAILURE)
     with printing(f"{shown(folder)}: the batch is there"):
         click.echo(shown(folder))
         if summary is None:

@@ -84,7 +84,7 @@ def _touchdown(summary: Mapping[str, Any]) -> Sheet:
 
 def _worst(summary: Mapping[str, Any]) -> Sheet:
     flights: Sequence[Mapping[str, Any]] = summary["worst"]["flights"][:WORST]
-    rows: "list[list[str | Text]]" = []
+    rows: list[list[str | Text]] = []
     for flight in flights:
         what, limit = "", flight["limit"]
         if limit:
