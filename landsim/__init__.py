@@ -16,8 +16,8 @@ the same, and what the simulation adds:
   ``_ft``, ``_kt``, ``_px``), and so does every key of a file and every column of a log.
 - *runway*: origin at the middle of the threshold, x along the centreline in the landing direction, y right, z down;
   fixed to the Earth.  A log's ``along`` is x, ``cross`` is y and ``height`` is -z.
-- *body*: forward, right, down from the centre of gravity.  Roll is positive right side down, pitch nose up, yaw nose
-  right; Euler angles (z-y-x) appear at the edges only.
+- *body*: forward, right, down from the nominal centre of gravity.  Roll is positive right side down, pitch nose up,
+  yaw nose right; Euler angles (z-y-x) appear at the edges only.
 - Elevator: trailing edge down is positive (nose down).  Aileron and rudder: positive rolls and yaws right.
 - What is true is in ``landsim.truth``, what is known on board in ``landsim.state``.  Guidance and navigation cannot
   import the truth.
@@ -28,14 +28,19 @@ Modules
 A module imports from those below it only; a contract in the checks holds this.
 
 ===================================  ==================================================================================
-``cli``, ``terminal``                parse arguments and print; ``tables`` are those at the end of a flight or a study
+``cli``, ``terminal``                parse arguments and print; ``tables`` are those at the end of what was done
 ``report``, ``plots``                pictures; the only ones that import matplotlib
+``page``                             the report as one HTML file
+``charts``                           what the figures of a batch show, as data, from its summary alone
 ``runs``                             run folders, written whole or not at all
 ``budget``                           the line precision that bounds ask for, and the ranges from which they hold
 ``study``                            errors by range, sampled and flown, against a paper's bounds
-``batch``                            one flight as a row: the pure function of scenario and seed
+``batch``                            many flights: rows, the engine, statistics, comparison
 ``simulate``, ``recorder``           the loop and what it keeps: the only ones that hold truth and navigation both
+``plugins``                          estimators and controllers of others: found, made, guarded; what they import
+``onboard``                          what navigation and guidance are told of a scenario
 ``modes``                            the aircraft's modes, from JSBSim's own linearisation
+``dispersion``                       what a scenario's dispersions draw for each flight
 ``plant``                            JSBSim, and the only one that imports it; feet, slugs and degrees end here
 ``sensors``                          truth to measurements: camera lines, one IMU, pitot
 ``navigation``                       drives the estimator and its filter

@@ -13,7 +13,8 @@ README = (Path(__file__).resolve().parents[1] / "README.md").read_text(encoding=
 
 
 def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+    fenced = re.findall(r"^```(\w*)\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
+    return [block for tongue, block in fenced if tongue == language]
 
 
 def test_python_examples_run() -> None:
@@ -25,7 +26,7 @@ def test_python_examples_run() -> None:
 
 def test_commands_are_known() -> None:
     lines = [line for block in blocks("") for line in block.splitlines() if line.startswith("landsim ")]
-    assert len(lines) == 12
+    assert len(lines) == 20
     for line in lines:
         command, *arguments = shlex.split(line, comments=True)[1:]
         known = landsim.commands[command]
@@ -39,4 +40,7 @@ def test_links_lead_somewhere(target: str) -> None:
 
 def test_the_help_names_every_command() -> None:
     text = CliRunner().invoke(landsim, ["--help"]).output
-    assert all(f"  {command}" in text for command in ("list", "check", "run", "plot", "budget"))
+    assert all(
+        f"  {command}" in text
+        for command in ("list", "check", "run", "plot", "budget", "batch", "merge", "replay", "compare")
+    )
