@@ -1,8 +1,9 @@
 """The filter: inertial navigation corrected by vision, 15 error states, on filterpy's extended Kalman filter.
 
 The nominal state runs outside at the rate of the inertial unit (`estimator.strapdown`); the filter carries the error
-and its covariance at the rate of the camera.  After each update the error is taken into the nominal state and set to
-zero.
+and its covariance at the rate of the camera.  The update is filterpy's; the prediction of an error that is zero is that
+of its covariance alone (`estimator.strapdown.predicted`).  After each update the error is taken into the nominal state
+and set to zero.
 """
 
 import math

@@ -68,8 +68,8 @@ def begun(folder: Path) -> Iterator[Cluster]:
 
 
 @pytest.fixture
-def dask(tmp_path: Path) -> Iterator[Cluster]:
-    with begun(tmp_path / "dask") as made:
+def dask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    with begun(tmp_path_factory.mktemp("workers")) as made:
         yield made
 
 
@@ -195,7 +195,7 @@ def test_a_cluster_that_cannot_fly(
     aircraft = short().aircraft_config.folder / "elsewhere"
     monkeypatch.undo()
     with (
-        pytest.raises(InputError, match="has no folder .*elsewhere, where the aircraft is"),
+        pytest.raises(InputError, match=r"has no folder .*elsewhere, where the aircraft is"),
         on_dask(dask.address, 1, 60.0, aircraft, None),
     ):
         pass

@@ -50,7 +50,7 @@ def on_dask(address: str | None, count: int, time_limit: float, aircraft: Path, 
     aircraft : Path
         The aircraft's folder, which every worker has to have.
     seen : Path, optional
-        A folder above the one where whole flights are kept, which then every worker has to have as well.
+        A file that every worker has to find, since it keeps whole flights in the folder where that stands.
 
     Raises
     ------
@@ -65,7 +65,12 @@ def on_dask(address: str | None, count: int, time_limit: float, aircraft: Path, 
     if address is None:
         with (
             LocalCluster(  # type: ignore[no-untyped-call]
-                n_workers=1, threads_per_worker=count, processes=False, dashboard_address=None, memory_limit=0
+                n_workers=1,
+                threads_per_worker=count,
+                processes=False,
+                memory_limit=0,
+                dashboard_address="127.0.0.1:0",
+                scheduler_kwargs={"dashboard": False},
             ) as local,
             Client(local, set_as_default=False) as client,  # type: ignore[no-untyped-call]
         ):
@@ -105,12 +110,12 @@ def _probe(client: Any, address: str, aircraft: Path, seen: Path | None) -> None
         if not has_aircraft:
             raise InputError(f"{what} {worker} has no folder {aircraft}, where the aircraft is")
         if not has_folder:
-            raise InputError(f"{what} {worker} has no folder {seen}, which --keep needs")
+            raise InputError(f"{what} {worker} does not see this machine's files, which --keep needs")
 
 
 def probe(aircraft: Path, seen: Path | None) -> tuple[dict[str, str], bool, bool]:
-    """What a worker has: its versions, and whether it has the folders."""
-    return dict(versions()), aircraft.is_dir(), seen is None or seen.is_dir()
+    """What a worker has: its versions, and whether it finds the folder and the file."""
+    return dict(versions()), aircraft.is_dir(), seen is None or seen.exists()
 
 
 def _engine(client: Any, time_limit: float) -> Iterator[Engine]:

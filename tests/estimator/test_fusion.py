@@ -3,6 +3,7 @@
 ====================  ============================================================================================
 consistency           normalised errors squared over 30 draws, two-sided: 9 and 15 states, early and late
 start                 the same of the covariance that the alignment gives; its velocity by hand
+update                filterpy's own, with scipy's inverse
 life                  three lines, two, three; none: it coasts; wrong ones are not believed
 roll                  the late stage's roll is the filter's own: what its error does is in the covariance
 ====================  ============================================================================================
@@ -14,6 +15,7 @@ from typing import NamedTuple
 import flight
 import numpy as np
 import pytest
+from filterpy.kalman import ExtendedKalmanFilter
 from numpy.random import default_rng
 from outside import DEG, LENGTH, PAPER, WIDTH, Poses, runway_lines
 from scipy.spatial.transform import Rotation
@@ -22,7 +24,7 @@ from scipy.stats import chi2
 from estimator import three_line_pose
 from estimator.alignment import Alignment, Incidence, Start
 from estimator.fusion import NO_UPDATE, Gates, InertialVisionFilter
-from estimator.innovation import LineObservation, Lines, pose_innovation
+from estimator.innovation import Innovation, LineObservation, Lines, pose_innovation
 from estimator.mount import Mount, body_from_camera
 from estimator.so3 import Array, flat
 from estimator.strapdown import ACCEL_BIAS, GYRO_BIAS, Inertial, corrected, inertial
@@ -202,6 +204,32 @@ def test_a_line_of_nans_is_not_believed(field: str) -> None:
     assert not navigator.observe(lines._replace(left=lines.left._replace(**{field: math.nan})).numbers(), 0.05).accepted
     assert navigator.state == state
     assert np.array_equal(navigator.covariance, covariance)
+
+
+@pytest.mark.parametrize("numbers", [6, 4])
+def test_an_update_is_filterpys(numbers: int) -> None:
+    navigator, _, _ = warmed_up(300)
+    navigator.predict()
+    rng = default_rng(3)
+    root = 0.1 * rng.normal(size=(numbers, numbers))
+    y, H, R = rng.normal(size=numbers), rng.normal(size=(numbers, 15)), root @ root.T
+    stock = ExtendedKalmanFilter(dim_x=15, dim_z=numbers)
+    stock.x, stock.P, stock.R = np.zeros(15), navigator.covariance.copy(), R
+    stock.update(y, lambda _: H, lambda _: np.zeros(numbers))
+    before = navigator.nominal, navigator.bias
+    update = navigator.apply(Innovation(y, H, R), math.inf)
+    assert update.nis == pytest.approx(stock.mahalanobis**2, rel=1e-9)
+    size = np.sqrt(np.diag(stock.P))
+    assert np.abs((navigator.covariance - stock.P) / np.outer(size, size)).max() < 1e-8
+    expected = np.append(corrected(before[0], stock.x), before[1] + stock.x[9:])
+    np.testing.assert_allclose(np.append(navigator.nominal, navigator.bias), expected, rtol=1e-9, atol=1e-12)
+
+
+def test_an_innovation_without_an_inverse_is_an_error() -> None:
+    navigator, _, _ = warmed_up(300)
+    navigator.predict()
+    with pytest.raises(np.linalg.LinAlgError):
+        navigator.apply(Innovation(np.zeros(4), np.zeros((4, 15)), np.zeros((4, 4))), math.inf)
 
 
 def test_three_lines_two_three() -> None:

@@ -33,6 +33,7 @@ from estimator.strapdown import (
     gravity_at,
     increments,
     inertial,
+    predicted,
     process_noise,
     propagate,
     transition,
@@ -228,6 +229,19 @@ def test_transition_by_finite_differences(attitude: Mat3) -> None:
     shown = np.abs(expected) > 3.0 * missing + 1e-4
     assert shown.sum() > 45
     assert got[shown] == pytest.approx(expected[shown], rel=0.25)
+
+
+def test_prediction_is_the_product_of_its_matrices() -> None:
+    rng = np.random.default_rng(5)
+    root = rng.normal(size=(15, 15))
+    P, Q = root @ root.T, np.diag(rng.uniform(size=15))
+    nominal = np.array((*rng.normal(size=6), *from_euler(0.1, -0.2, 0.3), *rng.normal(size=3)))
+    before = nominal.copy()
+    moved, got = predicted(nominal, P, Q, 1.0 / 30.0)
+    F = transition(nominal, 1.0 / 30.0)
+    np.testing.assert_allclose(got, F @ P @ F.T + Q, rtol=1e-12, atol=1e-12)
+    assert np.array_equal(nominal, before)
+    assert moved.tolist() == [*before[:15], 0.0, 0.0, 0.0]
 
 
 def test_process_noise_is_van_loans() -> None:
