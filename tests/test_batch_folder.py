@@ -169,7 +169,7 @@ class TestFolder:
         path.write_bytes(damaged[damage])
         with open_batch(tmp_path / "b", scenario, identity(scenario, 9), resume=True) as batch:
             assert [aside.name for aside in batch.chunks.damaged] == [path.name + ".damaged"]
-            assert set(range(4)) < set(batch.chunks.missing())
+            assert set(range(4)) <= set(batch.chunks.missing())  # the ninth may have been flown before the interrupt
         fly_into(tmp_path / "b", scenario, identity(scenario, 9), resume=True, fly=made_up)
         same(tmp_path / "b", tmp_path / "whole")
 

@@ -418,14 +418,16 @@ class TestOtherCommands:
     def test_version(self, landsim: Run) -> None:
         assert landsim("--version") == (0, f"landsim, version {__version__}\n", "")
 
-    @pytest.mark.parametrize("command", [[], ["list"], ["check"], ["run"], ["plot"]])
+    @pytest.mark.parametrize(
+        "command", [[], ["list"], ["check"], ["run"], ["batch"], ["merge"], ["replay"], ["compare"], ["plot"]]
+    )
     def test_help(self, command: list[str], landsim: Run) -> None:
         code, out, err = landsim(*command, "--help")
         assert (code, err) == (0, "")
         assert out.startswith("Usage: landsim")
 
 
-HEAVY = {"numpy", "numba", "scipy", "pydantic", "rich", "pyarrow", "matplotlib", "filterpy", "jsbsim"}
+HEAVY = {"numpy", "numba", "scipy", "pydantic", "rich", "pyarrow", "matplotlib", "filterpy", "jsbsim", "distributed"}
 
 
 class TestImports:
@@ -437,7 +439,7 @@ class TestImports:
         assert exit_code == 0, err
         return set(out.rsplit("IMPORTED", 1)[1].split())
 
-    @pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["--version"], ["list"]])
+    @pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["batch", "--help"], ["--version"], ["list"]])
     def test_what_needs_no_library_imports_none(self, arguments: list[str], tmp_path: Path) -> None:
         assert not HEAVY & self.imported(f"from landsim.cli import main; main({arguments})", tmp_path)
 

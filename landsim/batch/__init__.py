@@ -4,7 +4,7 @@
 
     row                  one flight as a row: the pure function of scenario and seed
     rows                 rows as Parquet
-    pool, worker         processes that fly, as an executor; the far end of their pipes
+    pool                 processes that fly, as an executor; process is one of them, worker the far end of its pipes
     cluster              the same on Dask
     job, engine          one flight to do; flights through any executor, a bounded number at a time
     identity             what makes two batches the same

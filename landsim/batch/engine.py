@@ -86,7 +86,7 @@ def rows_of_jobs(
                 job = flying.pop(future)
                 yield _row(future, job, lost)
     except (BrokenExecutor, CancelledError) as failure:
-        raise BatchStopped(str(failure) or "the flights have been cancelled") from None
+        raise BatchStopped(str(failure) or "who was to fly has dropped the flights") from None
     finally:
         for future in flying:
             future.cancel()

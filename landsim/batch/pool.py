@@ -6,54 +6,27 @@ among all of their processes: one that is killed while it writes its result leav
 
 import os
 import pickle
-import re
-import subprocess
-import sys
-import tempfile
 import threading
-import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, as_completed
 from contextlib import contextmanager, suppress
 from queue import Empty, SimpleQueue
-from typing import IO, Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 from numpy.typing import ArrayLike
 
+from landsim.batch.process import Process, WorkerDied
 from landsim.batch.row import Row, flight_row
-from landsim.batch.worker import BEGIN, Answer, Call, nothing, read_frame, write_frame
+from landsim.batch.worker import Call, nothing
 from landsim.config import Scenario
-from landsim.threads import THREAD_VARIABLES
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 
-GRACE_S = 3.0
-"""A process that has not ended itself so long after its limit is killed: one that is stopped cannot."""
 START_LIMIT_S = 300.0
 """For the start of a process, its initializer included."""
 START_ATTEMPTS = 10
 """Of a process that dies before it is ready: it may be killed then as well as later."""
-LONGEST_TRACEBACK = 20_000
-"""Characters that are kept of what a process said when it ended."""
-
-
-class WorkerDied(RuntimeError):
-    """The process ended while it was at work.
-
-    Attributes
-    ----------
-    traceback : str or None
-        Where it was, a line a call, the innermost last, if it could still say so.
-    """
-
-    def __init__(self, message: str, traceback: str | None = None) -> None:
-        super().__init__(message)
-        self.traceback = traceback
-
-
-class TookTooLong(WorkerDied):
-    """The process was ended because it was at work for longer than its limit."""
 
 
 class Processes(Executor):
@@ -93,7 +66,7 @@ class Processes(Executor):
         self._first = _dumps(Call(initializer or nothing, initargs, {}, START_LIMIT_S))
         self._waiting: SimpleQueue[tuple[Future[Any], bytes] | None] = SimpleQueue()
         self._threads: list[threading.Thread] = []
-        self._processes: set[_Process] = set()
+        self._processes: set[Process] = set()
         self._lock = threading.Lock()
         self._closed = False
         self._stopped = False
@@ -153,7 +126,7 @@ class Processes(Executor):
 
     def _serve(self) -> None:
         """One process after the other, and a call at a time."""
-        process: _Process | None = None
+        process: Process | None = None
         item: tuple[Future[Any], bytes] | None = None
         try:
             process = self._start()
@@ -167,17 +140,18 @@ class Processes(Executor):
                 item = None
                 if not process.lives() and not self._stopped:
                     process = self._start(process)
-        except BrokenExecutor as failure:
+        except (BrokenExecutor, OSError) as failure:
+            broken = BrokenExecutor(str(failure))
             with self._lock:
                 self._broken = str(failure)
-                self._drain(failure)
+                self._drain(broken)
             if item is not None:
-                item[0].set_exception(failure)
+                item[0].set_exception(broken)
         finally:
             if process is not None:
                 self._forget(process)
 
-    def _settle(self, future: "Future[Any]", process: "_Process") -> None:
+    def _settle(self, future: "Future[Any]", process: Process) -> None:
         try:
             answer = process.hear(self.time_limit)
         except WorkerDied as failure:
@@ -193,12 +167,12 @@ class Processes(Executor):
                 answer.failure.add_note(answer.traceback)
             future.set_exception(answer.failure)
 
-    def _start(self, before: "_Process | None" = None) -> "_Process":
+    def _start(self, before: Process | None = None) -> Process:
         if before is not None:
             self._forget(before)
         said, final = "", False
         for _ in range(START_ATTEMPTS):
-            process = _Process()
+            process = Process()
             with self._lock:
                 self._processes.add(process)
                 if self._stopped:
@@ -216,7 +190,7 @@ class Processes(Executor):
                 break
         raise BrokenExecutor(f"no process could be started: {said or 'it ended at once'}")
 
-    def _forget(self, process: "_Process") -> None:
+    def _forget(self, process: Process) -> None:
         with self._lock:
             self._processes.discard(process)
         process.close()
@@ -229,107 +203,7 @@ class Processes(Executor):
                     item[0].cancel()
                 elif item[0].set_running_or_notify_cancel():
                     item[0].set_exception(failure)
-
-
-class _Process:
-    """A worker and the pipes to it."""
-
-    def __init__(self) -> None:
-        self._said: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
-        apart: dict[str, Any] = {"process_group": 0} if os.name == "posix" else {"creationflags": 0x200}
-        self._popen = subprocess.Popen(
-            [sys.executable, "-c", BEGIN],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._said,
-            env=os.environ | dict.fromkeys(THREAD_VARIABLES, "1"),
-            **apart,  # an interrupt from the terminal is for its foreground group
-        )
-        self.pid = self._popen.pid
-        self._begun = time.monotonic()
-        with suppress(OSError):  # it may have been killed already
-            pickle.dump(sys.path, self._to)
-            self._to.flush()
-
-    @property
-    def _to(self) -> Any:
-        return self._popen.stdin
-
-    def lives(self) -> bool:
-        return self._popen.poll() is None
-
-    def kill(self) -> None:
-        self._popen.kill()
-
-    def close(self) -> None:
-        with suppress(OSError):
-            self._to.close()  # at which it ends
-        with suppress(subprocess.TimeoutExpired):
-            self._popen.wait(GRACE_S)
-        self._popen.kill()
-        self._popen.wait()
-        if self._popen.stdout is not None:
-            self._popen.stdout.close()
-        self._said.close()
-
-    def tell(self, message: bytes) -> bool:
-        """Whether it could be told."""
-        self._begun = time.monotonic()
-        try:
-            write_frame(self._to, message)
-        except OSError:
-            return False
-        return True
-
-    def hear(self, limit: float | None) -> Answer:
-        """What it answers, within a limit of wall time (s).
-
-        Raises
-        ------
-        WorkerDied
-        """
-        heard = threading.Event()
-
-        def overdue() -> None:
-            if not heard.wait(1.0):  # an answer that has come by now, while this process itself was stopped, is good
-                self._popen.kill()
-
-        timer = None
-        if limit is not None:
-            timer = threading.Timer(limit + GRACE_S, overdue)
-            timer.daemon = True
-            timer.start()
-        try:
-            frame = read_frame(self._popen.stdout)  # type: ignore[arg-type]
-        except (EOFError, OSError):
-            raise self._why(limit) from None
-        finally:
-            heard.set()
-            if timer is not None:
-                timer.cancel()
-        answer: Answer = pickle.loads(frame)
-        return answer
-
-    def _why(self, limit: float | None) -> WorkerDied:
-        taken = time.monotonic() - self._begun
-        with suppress(subprocess.TimeoutExpired):
-            self._popen.wait(GRACE_S)  # it has closed its pipe: it is about to end
-        self._popen.kill()
-        code = self._popen.wait()
-        self._said.seek(0)
-        said = self._said.read(LONGEST_TRACEBACK).decode(errors="replace")
-        if limit is not None and taken >= limit:
-            return TookTooLong(f"took longer than the limit of {limit:g} s of wall time", calls_of(said))
-        return WorkerDied(f"worker died: {f'signal {-code}' if code < 0 else f'exit code {code}'}", calls_of(said))
-
-
-def calls_of(dump: str) -> str | None:
-    """Where a process was, of what ``faulthandler`` wrote: a line a call of its main thread, the innermost last."""
-    threads = re.split(r"^(?:Current thread|Thread) .*\n", dump, flags=re.MULTILINE)
-    found = re.findall(r'^  File "(?:.*[/\\])?(.*)", line (\d+) in (.*)$', threads[-1], re.MULTILINE)
-    calls = [f"{file}:{line} in {name}" for file, line, name in reversed(found)]
-    own = [i for i, call in enumerate(calls) if call.startswith("worker.py:")]
-    return "\n".join(calls[own[-1] + 1 :] if own else calls) or None
+            self._waiting.put(None)  # that was a thread's sign to end
 
 
 def _dumps(call: Call) -> bytes:
