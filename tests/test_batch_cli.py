@@ -132,7 +132,7 @@ class TestBatch:
         os.killpg(batch.pid, number) if number == signal.SIGINT else batch.send_signal(number)
         out, err = batch.communicate(timeout=60)
         assert (batch.returncode, out) == (130, "")
-        (line,) = err.splitlines()
+        *_, line = err.splitlines()  # after lines of progress, where the machine is slow
         assert line.startswith("landsim: interrupted; what was flown is kept; to go on: landsim batch landing --set")
         assert line.endswith("--workers 2 --resume --out b")
         assert not list((tmp_path / "b").rglob("*.partial"))
