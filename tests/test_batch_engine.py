@@ -52,7 +52,6 @@ class TestProcesses:
             value = pool.submit(divmod, 7, 2)
             raised = pool.submit(divmod, 7, 0)
             ended = pool.submit(os._exit, 3)
-            shot = pool.submit(os.kill, os.getpid() and 0, 0)
             assert value.result(60) == (3, 1)
             with pytest.raises(ZeroDivisionError) as caught:
                 raised.result(60)
@@ -60,7 +59,6 @@ class TestProcesses:
             assert "Traceback" in caught.value.__notes__[0]
             with pytest.raises(WorkerDied, match="worker died: exit code 3"):
                 ended.result(60)
-            assert shot.result(60) is None
             with pytest.raises(WorkerDied, match="worker died: signal 9"):
                 pool.submit(signal.raise_signal, signal.SIGKILL).result(60)
             assert pool.submit(divmod, 9, 4).result(60) == (2, 1)
@@ -105,7 +103,7 @@ class TestProcesses:
                 futures[0].exception(60)
                 for _ in range(3):
                     time.sleep(0.1 * rng.random())
-                    for pid in rng.sample(pool.pids(), 1):
+                    for pid in pool.pids()[:1]:
                         os.kill(pid, signal.SIGKILL)
                 for future in futures:
                     failure = future.exception(60)

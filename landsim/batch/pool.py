@@ -122,7 +122,7 @@ class Processes(Executor):
     def pids(self) -> list[int]:
         """Of the processes that there are now."""
         with self._lock:
-            return [process.pid for process in self._processes]
+            return [process.pid for process in self._processes if process.lives()]
 
     def _serve(self) -> None:
         """One process after the other, and a call at a time."""

@@ -88,8 +88,10 @@ def main() -> None:
     _send(answers, _answer(calls.get())._replace(value=None))
     gc.collect()
     gc.freeze()  # what is loaded by now stays: no collection has to look at it again
+    gc.disable()  # a flight makes many objects and few cycles: what these hold is freed between flights
     while True:
         _send(answers, _answer(calls.get()))
+        gc.collect()
 
 
 def _own_output() -> BinaryIO:
