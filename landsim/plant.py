@@ -25,14 +25,17 @@ from landsim.attitude import runway_attitude
 from landsim.errors import InputError
 from landsim.runway import Runway
 from landsim.state import Command
-from landsim.truth import NOMINAL, InitialState, Loading, Truth
+from landsim.truth import MOTION, NOMINAL, NUMBERS, InitialState, Loading, Truth
 from landsim.units import DEG, FT, INCH, LB, LBF
 
 RUN_UP_S = 1.0
 """Time the engine runs, airframe held, before trim: JSBSim's search for a steady propeller diverges from standstill."""
 RUN_UP_THROTTLE = 0.3
-CONTACT_HEIGHT = 30.0
-"""m; above it no aircraft touches the ground or feels it: contacts are not asked, and the terrain is left as it is."""
+TERRAIN_HEIGHT = 30.0
+"""m; above it no aircraft feels the ground: the terrain is left as it is."""
+CONTACT_HEIGHT = 10.0
+"""m; above it none touches the ground: contacts are not asked."""
+_ON_GROUND = MOTION + 7
 
 _INTEGRATORS = (
     "simulation/integrator/rate/rotational",
@@ -254,7 +257,7 @@ class Plant:
                 *(runway.latitude, runway.longitude, runway.heading),
             )
         )
-        self._rows = rows(15)
+        self._rows = rows(NUMBERS)
         self._dt = 1.0 / rate_hz
         self._steps = 0
         self._started = False
@@ -459,17 +462,23 @@ class Plant:
             x, y, z, altitude, latitude, longitude, vx, vy, vz, phi, theta, psi, airspeed,
             elevator, aileron, rudder, throttle, thrust,
         ) = [read() for read in self._read]  # fmt: skip
-        motion = next(self._rows)
-        down, cosine = _motion(motion, self._site, x, y, z, vx, vy, vz, latitude, longitude, phi, theta, psi)
+        motion, time, airspeed = next(self._rows), self._steps * self._dt, FT * airspeed
+        down, cosine = _motion(
+            motion, self._site, x, y, z, vx, vy, vz, latitude, longitude, phi, theta, psi,
+            time, airspeed, elevator, aileron, rudder, throttle, LBF * thrust,
+        )  # fmt: skip
         nose = left = right = touching = False
-        if down > -CONTACT_HEIGHT:
+        if down > -TERRAIN_HEIGHT:
             # here the ellipsoid's normal through the aircraft meets the runway's plane
             self._set_terrain(altitude + down / (FT * cosine))
-            on_nose, on_left, on_right = self._wheels
-            nose, left, right = on_nose() != 0.0, on_left() != 0.0, on_right() != 0.0
-            for touches in self._structure:
-                if touches() != 0.0:
-                    touching = True
+            if down > -CONTACT_HEIGHT:
+                on_nose, on_left, on_right = self._wheels
+                nose, left, right = on_nose() != 0.0, on_left() != 0.0, on_right() != 0.0
+                if nose or left or right:
+                    motion[_ON_GROUND:] = nose, left, right
+                for touches in self._structure:
+                    if touches() != 0.0:
+                        touching = True
         if self._loading.cg_forward != 0.0:
             # from the centre of gravity, which JSBSim tells of, back to where it nominally is
             back, (yawing, pitching) = -self._loading.cg_forward, [read() for read in self._turn]
@@ -478,20 +487,7 @@ class Plant:
             motion[3:6] += rotate(attitude, (0.0, back * yawing, -back * pitching))
         return tuple.__new__(  # what Truth(...) does, at half the price
             Truth,
-            (
-                self._steps * self._dt,
-                motion,
-                FT * airspeed,
-                nose,
-                left,
-                right,
-                touching,
-                elevator,
-                aileron,
-                rudder,
-                throttle,
-                LBF * thrust,
-            ),
+            (time, motion, airspeed, nose, left, right, touching),
         )
 
 
@@ -513,8 +509,17 @@ def _motion(
     phi: float,
     theta: float,
     psi: float,
+    time: float,
+    airspeed: float,
+    elevator: float,
+    aileron: float,
+    rudder: float,
+    throttle: float,
+    thrust: float,
 ) -> tuple[float, float]:
     """Write to `motion`, which is `Truth.motion`, from JSBSim's position and velocity (ECEF, ft) and angles (rad).
+
+    The rest of its numbers stands there as it is given, with no wheel on the ground.
 
     `site` is R_runway_from_ecef times a foot, the origin in its axes (m), latitude, longitude and heading.  Returned
     are the z of the position (m) and the cosine of the angle between the verticals.
@@ -526,4 +531,7 @@ def _motion(
         motion[3 + i] = a * vx + b * vy + c * vz
     for i in range(9):
         motion[6 + i] = attitude[i]
+    motion[15], motion[16], motion[17], motion[18] = time, airspeed, elevator, aileron
+    motion[19], motion[20], motion[21] = rudder, throttle, thrust
+    motion[22:] = 0.0
     return motion[2], cosine

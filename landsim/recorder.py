@@ -1,12 +1,10 @@
 """What the loop keeps of a flight, and the log's table made of it.
 
-While the aircraft flies only references are kept; vision poses, angles, errors and standard deviations are worked out
-afterwards, for all rows at once.
+While the aircraft flies numbers are copied and references kept; vision poses, angles, errors and standard deviations
+are worked out afterwards, for all rows at once.
 """
 
 from collections.abc import Iterable, Sequence
-from itertools import chain
-from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -24,8 +22,8 @@ from landsim.log import AXES, COLUMNS, ENDS, LINES, QUANTITIES
 from landsim.navigation import FrameResult, Navigator
 from landsim.plugins.guard import WITHOUT_BIASES, Belief, GuardedEstimator
 from landsim.sensors import Imu, View
-from landsim.state import Command, Phase
-from landsim.truth import Truth
+from landsim.state import Command, Phase, Stage
+from landsim.truth import AFTER_MOTION, MOTION, NUMBERS, Truth
 from landsim.units import DEG, DEG_PER_HOUR
 
 
@@ -48,8 +46,26 @@ def _columns(rows: int, numbers: Iterable[float]) -> Array:
     return np.fromiter(numbers, float).reshape(rows, -1).T.copy()
 
 
-_SCALARS = ("time", "airspeed", "wow_nose", "wow_left", "wow_right", "elevator", "aileron", "rudder", "throttle")
-_scalars = itemgetter(*(Truth._fields.index(name) for name in _SCALARS))
+BLOCK = 1024
+"""Steps for which there is room at a time."""
+STEP = {
+    "motion": MOTION, **dict.fromkeys(AFTER_MOTION, 1), "nominal": MOTION, "pitot": 1, "tilt": 1, "reading": 1,
+}  # fmt: skip
+"""The numbers of a step, in their order."""
+_WIDTH = sum(STEP.values())
+_UNKNOWN = np.full(MOTION, np.nan)
+
+
+@compiled
+def _take_down(rows: Array, row: int, truth: Array, nominal: Array, pitot: float, tilt: float, reading: float) -> None:
+    """Write a step's numbers to a row."""
+    for i in range(NUMBERS):
+        rows[row, i] = truth[i]
+    for i in range(MOTION):
+        rows[row, NUMBERS + i] = nominal[i]
+    rows[row, NUMBERS + MOTION] = pitot
+    rows[row, NUMBERS + MOTION + 1] = tilt
+    rows[row, NUMBERS + MOTION + 2] = reading
 
 
 def _stacked(arrays: Sequence[Array]) -> Array:
@@ -58,8 +74,8 @@ def _stacked(arrays: Sequence[Array]) -> Array:
     return np.frombuffer(joined).reshape(len(arrays), *arrays[0].shape)
 
 
-def _body(motions: Sequence[Array]) -> Body:
-    rows = _stacked(motions)
+def _body(motions: Array) -> Body:
+    rows = motions.T.copy()
     return Body(rows[:, :3], rows[:, 3:6], rows[:, 6:15].reshape(-1, 3, 3))
 
 
@@ -99,13 +115,12 @@ class Recorder:
         self._width = width
         self._mount = mount
         self._wheels = wheels
-        self._truths: list[Truth] = []
-        self._nominals: list[Array] = []
-        self._others: list[float] = []
-        self._commands: list[Command] = []
-        self._command_rows: list[int] = []
-        self._command: Command | None = None
+        self._blocks: list[Array] = []
+        self._block = np.empty((0, _WIDTH))
+        self._row = 0
         self._count = 0
+        self._commands: list[float] = []
+        self._command_rows: list[int] = []
         self._frames: list[float] = []
         self._frame_rows: list[int] = []
         self._lines: list[Array] = []
@@ -117,25 +132,16 @@ class Recorder:
         self._covariance: list[Array] = []
 
     def step(
-        self,
-        truth: Truth,
-        navigator: Navigator | GuardedEstimator,
-        command: Command,
-        phase: Phase,
-        pitot: float,
-        tilt: float,
-        reading: float,
+        self, truth: Truth, navigator: Navigator | GuardedEstimator, pitot: float, tilt: float, reading: float
     ) -> None:
-        """Take down a step; the frame of the same step comes before it."""
-        nominal, ready, stage = navigator.nominal, navigator.ready, navigator.stage  # a plug-in's may raise
-        if command is not self._command:
-            self._command = command
-            self._commands.append(command)
-            self._command_rows.append(self._count)
+        """Take down a step; the frame of the same step comes before it, and a command before the first."""
+        nominal = navigator.nominal if navigator.ready else _UNKNOWN  # a plug-in's may raise
+        if self._row == len(self._block):
+            self._block, self._row = np.empty((BLOCK, _WIDTH)), 0
+            self._blocks.append(self._block)
+        _take_down(self._block, self._row, truth.motion, nominal, pitot, tilt, reading)
+        self._row += 1
         self._count += 1
-        self._truths.append(truth)
-        self._nominals.append(nominal)
-        self._others += (ready, stage, phase, pitot, tilt, reading)
 
     def frame(self, view: View, result: FrameResult, running: InertialVisionFilter | Belief | None, imu: Imu) -> None:
         """Take down a camera frame."""
@@ -151,26 +157,27 @@ class Recorder:
             self._filter_rows.append(self._count)
             self._covariance.append(running.covariance)
 
+    def command(self, command: Command, phase: Phase, stage: Stage) -> None:
+        """Take down what holds from this step to the next frame."""
+        self._commands += command
+        self._commands += (phase, stage)
+        self._command_rows.append(self._count)
+
     def table(self) -> dict[str, Array]:
         """The log: a column for each of `landsim.log.COLUMNS`."""
         log = {column.name: np.full(self._count, np.nan) for column in COLUMNS}
         if self._count == 0:
             return log
         self._drop_frame_without_step()
-        ready, stage, phase, pitot, tilt, reading = _columns(self._count, self._others)
-        truths = self._truths
-        true, fused = _body([truth.motion for truth in truths]), _body(self._nominals)
-        for known in fused:
-            known[ready == 0.0] = np.nan
-        time, airspeed, *wow, elevator, aileron, rudder, throttle = _columns(
-            self._count, chain.from_iterable(map(_scalars, truths))
-        )
-        commands = _columns(len(self._commands), chain.from_iterable(self._commands))
+        step = _named(np.concatenate(self._blocks)[: self._count].T.copy(), STEP)
+        true, fused = _body(step["motion"]), _body(step["nominal"])
+        pitot, tilt, reading = step["pitot"], step["tilt"], step["reading"]
+        commands = _columns(len(self._command_rows), self._commands)
         held = np.diff(np.append(self._command_rows, self._count))
-        command = dict(zip(Command._fields, np.repeat(commands, held, axis=1), strict=True))
+        command = _named(np.repeat(commands, held, axis=1), dict.fromkeys((*Command._fields, "phase", "stage"), 1))
 
-        log["time_s"] = time
-        log["phase"], log["stage"] = phase, stage
+        log["time_s"] = step["time"]
+        log["phase"], log["stage"] = command["phase"], command["stage"]
         _pose(log, "true", true, self._mount.lever, tilt)
         _pose(log, "fused", fused, self._mount.lever, reading)
         x, y, z = true.position.T
@@ -180,10 +187,12 @@ class Recorder:
         for i, axis in enumerate(AXES):
             log[f"true_velocity_{axis}_mps"] = true.velocity[:, i]
             log[f"fused_velocity_{axis}_mps"] = fused.velocity[:, i]
-        log["true_airspeed_mps"], log["pitot_airspeed_mps"] = airspeed, pitot
-        log["wow_nose"], log["wow_left"], log["wow_right"] = wow
-        log["elevator_deg"], log["aileron_deg"], log["rudder_deg"] = elevator / DEG, aileron / DEG, rudder / DEG
-        log["throttle"], log["brake"], log["steering"] = throttle, command["brake"], command["steering"]
+        log["true_airspeed_mps"], log["pitot_airspeed_mps"] = step["airspeed"], pitot
+        for wheel in ("nose", "left", "right"):
+            log[f"wow_{wheel}"] = step[f"wow_{wheel}"]
+        for surface in ("elevator", "aileron", "rudder"):
+            log[f"{surface}_deg"] = step[surface] / DEG
+        log["throttle"], log["brake"], log["steering"] = step["throttle"], command["brake"], command["steering"]
         log["tilt_deg"], log["tilt_reading_deg"] = tilt / DEG, reading / DEG
         engaged, flying = command["engaged"] > 0.0, command["idle"] == 0.0
         log["command_pitch_deg"] = np.where(engaged, command["pitch"] / DEG, np.nan)
@@ -194,7 +203,10 @@ class Recorder:
         return log
 
     def _drop_frame_without_step(self) -> None:
-        """Leave out the last frame if what came after it in the same step raised."""
+        """Leave out the last frame and its command if what came after it in the same step raised."""
+        if self._command_rows and self._command_rows[-1] == self._count:
+            del self._command_rows[-1]
+            del self._commands[-len(Command._fields) - 2 :]
         if self._frame_rows and self._frame_rows[-1] == self._count:
             del self._frames[-len(FRAME) :]
             for frames in (self._frame_rows, self._lines, self._true_ends, self._seen_ends):

@@ -189,7 +189,7 @@ def _fly(
     camera = LineCamera(scenario.camera, aircraft.mount.position_body_m, runway, camera_rng)
     navigator = estimator_of(scenario.plug_ins.estimator, estimator)
     guidance = controller_of(scenario.plug_ins.controller, controller)
-    command, phase = guidance.guide(navigator.state(0.0))
+    command, _ = guidance.guide(navigator.state(0.0))
     plant.command(command)
 
     rate, side_force = _ZERO, 0.0
@@ -212,8 +212,9 @@ def _fly(
             recorder.frame(view, result, navigator.filter, imu)
             diverged = navigator.diverged
             command, phase = guidance.guide(navigator.state(truth.time))
+            recorder.command(command, phase, navigator.stage)
             plant.command(command)
-        recorder.step(truth, navigator, command, phase, airspeed, mount.tilt, tilt_reading)
+        recorder.step(truth, navigator, airspeed, mount.tilt, tilt_reading)
         if diverged is not None:
             return End("diverged", diverged)
         if truth.wow_nose or truth.wow_left or truth.wow_right:
@@ -232,7 +233,7 @@ def _fly(
         plant.feed(rate, side_force, roll, pitch, navigator.airspeed)
         truth = plant.step()
         if truth.structure_contact or not -truth.motion.item(2) > BELOW_GROUND:  # the latter catches NaN
-            return _crash(recorder, truth, navigator, command, phase, airspeed, mount.tilt, tilt_reading)
+            return _crash(recorder, truth, navigator, airspeed, mount.tilt, tilt_reading)
     return End("timeout")
 
 

@@ -1,6 +1,7 @@
 """What is true.  The plant makes it; the sensors, the simulation loop and its recorder may hold it, nobody else.
 
-Named tuples and not dataclasses: one is made at every step, and a frozen dataclass costs five times as much.
+Named tuples and not dataclasses: one is made at every step, and a frozen dataclass costs five times as much.  What the
+log takes down stands in one array, so that it is copied at once.
 """
 
 from typing import NamedTuple
@@ -36,34 +37,59 @@ class Loading(NamedTuple):
 NOMINAL = Loading()
 
 
+MOTION = 15
+"""Numbers of position, velocity and attitude, as `estimator.strapdown.Inertial.numbers` begins."""
+AFTER_MOTION = (
+    "time", "airspeed", "elevator", "aileron", "rudder", "throttle", "thrust", "wow_nose", "wow_left", "wow_right"
+)  # fmt: skip
+"""The single numbers that follow."""
+NUMBERS = MOTION + len(AFTER_MOTION)
+_TIME, _AIRSPEED, _ELEVATOR, _AILERON, _RUDDER, _THROTTLE, _THRUST = range(MOTION, MOTION + 7)
+
+
 class Truth(NamedTuple):
     """The aircraft at one instant."""
 
     time: float
     """s since the start."""
     motion: Array
-    """(15,): position, velocity and attitude, as `estimator.strapdown.Inertial.numbers` begins; never written to.
+    """(25,): position, velocity and attitude, and what `AFTER_MOTION` names; never written to.
 
     They are those of the body's origin, which is the centre of gravity of the aircraft as it is nominally loaded.
     """
     airspeed: float
     """True airspeed, m/s."""
-    wow_nose: bool
-    wow_left: bool
-    wow_right: bool
+    wow_nose: bool = False
+    wow_left: bool = False
+    wow_right: bool = False
     """Weight on the nose, left main, right main wheel."""
-    structure_contact: bool
+    structure_contact: bool = False
     """A part that is not a wheel touches the ground."""
-    elevator: float
-    """rad, trailing edge down positive (nose down)."""
-    aileron: float
-    """rad, positive rolls right."""
-    rudder: float
-    """rad, positive yaws right."""
-    throttle: float
-    """0 to 1."""
-    thrust: float
-    """N."""
+
+    @property
+    def elevator(self) -> float:
+        """rad, trailing edge down positive (nose down)."""
+        return self.motion.item(_ELEVATOR)
+
+    @property
+    def aileron(self) -> float:
+        """rad, positive rolls right."""
+        return self.motion.item(_AILERON)
+
+    @property
+    def rudder(self) -> float:
+        """rad, positive yaws right."""
+        return self.motion.item(_RUDDER)
+
+    @property
+    def throttle(self) -> float:
+        """0 to 1."""
+        return self.motion.item(_THROTTLE)
+
+    @property
+    def thrust(self) -> float:
+        """N."""
+        return self.motion.item(_THRUST)
 
     @property
     def position(self) -> Vec3:

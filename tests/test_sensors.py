@@ -32,7 +32,7 @@ def truth_at(
     """A true state; euler_deg is yaw, pitch, roll."""
     attitude = flat(Rotation.from_euler("ZYX", euler_deg, degrees=True).as_matrix())
     motion = np.array((*position, *velocity, *attitude))
-    return Truth(time, motion, airspeed, False, False, False, False, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Truth(time, motion, airspeed)
 
 
 def camera(**changes: object) -> LineCamera:
