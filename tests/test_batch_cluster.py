@@ -95,6 +95,7 @@ def test_rows_are_those_of_processes_whatever_the_workers(dask: Cluster, tmp_pat
     }
 
 
+@pytest.mark.slow
 def test_flights_of_a_killed_worker_are_flown_by_another(dask: Cluster, tmp_path: Path) -> None:
     scenario = short()
     first, _ = dask.worker(), dask.worker()
@@ -114,6 +115,7 @@ def test_flights_of_a_killed_worker_are_flown_by_another(dask: Cluster, tmp_path
     same(tmp_path / "dask", tmp_path / "here")
 
 
+@pytest.mark.slow
 def test_no_process_of_a_batch_is_left_on_a_worker(dask: Cluster, tmp_path: Path) -> None:
     worker = dask.worker()
     scenario = short()

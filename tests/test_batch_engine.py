@@ -93,6 +93,7 @@ class TestProcesses:
             with pytest.raises(TookTooLong):
                 future.result(60)
 
+    @pytest.mark.slow
     def test_killed_at_any_moment_in_the_middle_of_a_result_too(self) -> None:
         """What is not lost is whole, and nothing waits for ever; the results take longer to write than to make."""
         rng = random.Random(4)

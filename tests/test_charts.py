@@ -287,6 +287,7 @@ def test_numbers_are_written_for_people() -> None:
     assert (percent(1.0), percent(0.98172), percent(None)) == ("100 %", "98.17 %", "–")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ordinary", "one flight", "no touchdown", "comparison, three"])
 def test_on_paper_every_word_is_on_the_sheet_and_none_is_tiny(summaries: dict[str, dict[str, Any]], name: str) -> None:
     for chart in charts_of(summaries[name]):
@@ -317,6 +318,7 @@ def ticks_out_of_sight(figure: Any) -> set[str]:
     return found
 
 
+@pytest.mark.slow
 def test_the_same_chart_makes_the_same_bytes(summaries: dict[str, dict[str, Any]], tmp_path: Path) -> None:
     (chart,) = batch_charts(summaries["ordinary"])["touchdown"]
     written = []

@@ -82,6 +82,7 @@ def test_links_lead_somewhere(target: str) -> None:
     assert (ROOT / "docs" / target).exists()
 
 
+@pytest.mark.slow
 def test_the_example_lands(site: Path, work: Path) -> None:
     for name, role in (("alpha-beta", "estimator"), ("even-flare", "controller")):
         plug_in = f"plug-ins.{role}={name}"

@@ -215,6 +215,7 @@ def test_a_single_range_is_a_figure_too() -> None:
     figure.draw_without_rendering()
 
 
+@pytest.mark.slow
 def test_files_are_whole_and_the_same_every_time(tmp_path: Path) -> None:
     style_before = dict(mpl.rcParams)
     folders = [tmp_path / name for name in ("one", "two")]

@@ -128,6 +128,7 @@ class TestRun:
         ]
         assert "roll error" in late.verdict["paragraphs"]["roll"]
 
+    @pytest.mark.slow
     def test_progress_ends_at_the_whole_and_another_seed_makes_another(self, late: StudyResult) -> None:
         told: list[tuple[float, float, str]] = []
         other = run_study(
@@ -326,6 +327,7 @@ class TestCommandLine:
         monkeypatch.setattr("landsim.study.run.run_study", instead)
         return seeds
 
+    @pytest.mark.slow
     def test_everything_is_in_the_folder(
         self, capsys: pytest.CaptureFixture[str], tmp_path: Path, made: list[int], monkeypatch: pytest.MonkeyPatch
     ) -> None:
