@@ -179,6 +179,13 @@ def test_the_ten_worst_flights_each_have_the_command_that_flies_them_again(page:
     assert "ValueError: no" in read(rows[worst.index(59)])
 
 
+@pytest.mark.parametrize(("shard", "part"), [("1/1", False), ("2/3", True), (None, False)])
+def test_only_a_shard_is_called_a_part_of_a_batch(shard: str | None, part: bool) -> None:
+    found = summary(BATCHES["one flight"])
+    found["batch"]["shard"] = shard
+    assert ("a part of a batch" in page_of(found)) == part
+
+
 def test_a_page_of_little_says_why_there_is_nothing() -> None:
     root = tree(page_of(summary(BATCHES["no touchdown"])))
     assert "No flight touched down" in read(section(root, "touchdown"))

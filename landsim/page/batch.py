@@ -82,7 +82,7 @@ def _summary(summary: Mapping[str, Any]) -> tuple[Block, ...]:
         blocks.append(Text(tuple(others)))
     if batch["asked"] is not None and batch["n"] != batch["asked"]:
         blocks.append(Text((f"{batch['n']} of {several(batch['asked'], 'flight')} asked for are in this report.",)))
-    if batch["shard"]:
+    if batch["shard"] not in {None, "1/1"}:
         blocks.append(Text((f"This is shard {batch['shard']}: a part of a batch.",)))
     return tuple(blocks)
 
