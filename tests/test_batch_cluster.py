@@ -184,7 +184,7 @@ def test_a_cluster_that_cannot_fly(
     dask: Cluster, landsim: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as hasty:
-        hasty.setattr(cluster, "CONNECT_S", 3.0)
+        hasty.setattr(cluster, "WORKER_S", 3.0)
         code, _, err = landsim("--scheduler", dask.address, "--out", "b")
     assert (code, len(err.splitlines())) == (2, 1)
     assert "has no workers; begin some with: dask worker tcp://" in err

@@ -9,8 +9,9 @@ import logging
 import threading
 import time
 import uuid
+import warnings
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future, wait
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -28,11 +29,17 @@ _P = ParamSpec("_P")
 _T = TypeVar("_T")
 
 CONNECT_S = 10.0
-"""For the scheduler to answer, and for the first of its workers to be there."""
+"""For the scheduler to answer, whatever it is asked."""
+WORKER_S = 10.0
+"""For the first of its workers to be there."""
+PROBE_S = 120.0
+"""For every worker to say what it has: it loads the simulation first."""
 ALONE_S = 60.0
 """A batch goes on for so long with no worker at all, or with no scheduler."""
 IDLE_S = 300.0
 """A process on a worker that has had nothing to do for so long ends: its batch may have been killed."""
+
+GONE = "the Dask scheduler does not answer any more"
 
 
 @contextmanager
@@ -58,49 +65,110 @@ def on_dask(address: str | None, count: int, time_limit: float, aircraft: Path, 
         If the scheduler does not answer, has no workers, or these would not fly the same flights.
     """
     try:
-        from distributed import Client, LocalCluster
+        from distributed import LocalCluster
     except ImportError:
         raise InputError("--engine dask needs the package distributed: pip install 'landsim[cluster]'") from None
     _be_quiet()
     if address is None:
-        with (
-            LocalCluster(  # type: ignore[no-untyped-call]
+        with _refused("--engine dask: no cluster begins in this process"):
+            local = LocalCluster(  # type: ignore[no-untyped-call]
                 n_workers=1,
                 threads_per_worker=count,
                 processes=False,
                 memory_limit=0,
                 dashboard_address="127.0.0.1:0",
                 scheduler_kwargs={"dashboard": False},
-            ) as local,
-            Client(local, set_as_default=False) as client,  # type: ignore[no-untyped-call]
-        ):
-            yield from _engine(client, time_limit)
+            )
+        try:
+            with _refused("--engine dask: no cluster begins in this process"):
+                client = _connected(local)
+            with _closing(client):
+                yield from _engine(client, "--engine dask", time_limit)
+        finally:
+            _ended(local.close)
         return
-    client = _connected(Client, address)
-    with client:
-        _probe(client, address, aircraft, seen)
-        yield from _engine(client, time_limit)
-
-
-def _connected(connect: Callable[..., Any], address: str) -> Any:
     what = f"--scheduler {address}"
+    with _refused(f"{what}: no Dask scheduler answers there"):
+        client = _connected(address)
+    with _closing(client):
+        with _refused(what):
+            _wait_for_worker(client, address)
+            _probe(client, address, aircraft, seen)
+        yield from _engine(client, what, time_limit)
+
+
+@contextmanager
+def _refused(what: str) -> Iterator[None]:
+    """Whatever is raised, in a line: Dask lets through what its sockets, its protocol and its timers raise."""
     try:
-        client = connect(address, timeout=CONNECT_S, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:  # gaierror and TimeoutError are OSErrors
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(f"{what}: no Dask scheduler answers there: {reason}") from None
+        yield
+    except InputError:
+        raise
+    except Exception as failure:  # noqa: BLE001
+        reason = str(failure).splitlines()[0] if str(failure) else type(failure).__name__
+        raise InputError(f"{what}: {reason}") from None
+
+
+def _within(limit: float, call: Callable[[], _T]) -> _T:
+    """What a call gives within a limit of wall time (s); Dask's own limits leave out some of its waiting.
+
+    Raises
+    ------
+    ConnectionError
+        If it takes longer, and goes on in its thread.
+    """
+    done: Future[_T] = Future()
+
+    def do() -> None:
+        try:
+            done.set_result(call())
+        except Exception as failure:  # noqa: BLE001 - raised where it is waited for
+            done.set_exception(failure)
+
+    threading.Thread(target=do, daemon=True).start()
+    if not wait([done], limit).done:
+        raise ConnectionError(f"no answer within {limit:g} s")
+    return done.result()
+
+
+def _connected(address: Any) -> Any:
+    """A client of a scheduler, by its address, or of a cluster."""
+    from distributed import Client
+
+    class Unattended(Client):
+        def __del__(self) -> None:
+            """Nothing: one that never had an answer would wait for it, and complain on standard error."""
+
+    return _within(2.0 * CONNECT_S, partial(Unattended, address, timeout=CONNECT_S, set_as_default=False))
+
+
+@contextmanager
+def _closing(client: Any) -> Iterator[None]:
     try:
-        client.wait_for_workers(1, timeout=CONNECT_S)
+        yield
+    finally:
+        _ended(partial(client.close, None))
+
+
+def _ended(end: Callable[[], object]) -> None:
+    """Not waited for without end, and no failure: the scheduler may be what has failed."""
+    with suppress(Exception):
+        _within(CONNECT_S, end)
+
+
+def _wait_for_worker(client: Any, address: str) -> None:
+    try:
+        _within(WORKER_S + CONNECT_S, partial(client.wait_for_workers, 1, timeout=WORKER_S))
     except TimeoutError:
-        client.close()
+        what = f"--scheduler {address}"
         raise InputError(f"{what}: the scheduler has no workers; begin some with: dask worker {address}") from None
-    return client
 
 
 def _probe(client: Any, address: str, aircraft: Path, seen: Path | None) -> None:
     """InputError if a worker cannot fly the same flights."""
     what = f"--scheduler {address}: worker"
-    for worker, found in client.run(probe, aircraft, seen, on_error="return").items():
+    asked = _within(PROBE_S, partial(client.run, probe, aircraft, seen, on_error="return"))
+    for worker, found in asked.items():
         if isinstance(found, BaseException):
             raise InputError(f"{what} {worker} cannot fly: {type(found).__name__}: {found}")
         there, has_aircraft, has_folder = found
@@ -118,24 +186,21 @@ def probe(aircraft: Path, seen: Path | None) -> tuple[dict[str, str], bool, bool
     return dict(versions()), aircraft.is_dir(), seen is None or seen.exists()
 
 
-def _engine(client: Any, time_limit: float) -> Iterator[Engine]:
+def _engine(client: Any, what: str, time_limit: float) -> Iterator[Engine]:
     batch = uuid.uuid4().hex
-    threads = sum(client.nthreads().values())
+    with _refused(what):
+        threads = sum(_within(CONNECT_S, client.nthreads).values())
+        executor = client.get_executor(pure=False)
     try:
-        yield Engine(_Flown(client.get_executor(pure=False), batch, time_limit), 2 * threads + 2, _Check(client))
+        yield Engine(_Flown(executor, batch, time_limit), 2 * threads + 2, _Check(client))
     finally:
-        # Not waited for without end: the scheduler may be what has failed.
-        ending = threading.Thread(target=_end_flyers, args=(client, batch), daemon=True)
-        ending.start()
-        ending.join(CONNECT_S)
-
-
-def _end_flyers(client: Any, batch: str) -> None:
-    with suppress(Exception):
-        client.run(end_flyers, batch, on_error="ignore")
+        _ended(partial(client.run, end_flyers, batch, on_error="ignore"))
 
 
 def _be_quiet() -> None:
+    from distributed.versions import VersionMismatchWarning
+
+    warnings.simplefilter("ignore", VersionMismatchWarning)  # of many lines; the versions that matter are compared here
     for name in ("distributed", "tornado", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     for name in list(logging.root.manager.loggerDict):
@@ -161,9 +226,10 @@ class _Check:
             raise BatchStopped(gone)
 
     def _gone(self) -> str | None:
-        if self._client.status != "running":
-            return "the Dask scheduler does not answer any more"
-        return None if self._client.nthreads() else "no Dask worker is left"
+        if self._client.status == "running":
+            with suppress(Exception):
+                return None if _within(CONNECT_S, self._client.nthreads) else "no Dask worker is left"
+        return GONE
 
 
 class _Flown(Executor):
@@ -174,7 +240,10 @@ class _Flown(Executor):
         self._call = partial(in_flyer, batch, time_limit)
 
     def submit(self, fn: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs) -> "Future[_T]":
-        return self._executor.submit(self._call, fn, args, kwargs)
+        try:
+            return self._executor.submit(self._call, fn, args, kwargs)
+        except Exception as failure:  # noqa: BLE001 - of a client that has given its scheduler up
+            raise BrokenExecutor(f"{GONE}: {failure}") from None
 
 
 class _Flyer:
