@@ -13,6 +13,8 @@ from pathlib import Path
 import pytest
 
 import landsim
+from landsim.errors import InputError
+from landsim.onboard import must_have_plug_ins
 
 ROOT = Path(landsim.__file__).parents[1]
 EXAMPLE = ROOT / "docs/examples/alpha-beta"
@@ -80,6 +82,22 @@ def test_python_on_the_page_is_the_whole_of_the_module() -> None:
 @pytest.mark.parametrize("target", re.findall(r"\]\(([^)#:]+)\)", PAGE))
 def test_links_lead_somewhere(target: str) -> None:
     assert (ROOT / "docs" / target).exists()
+
+
+@pytest.mark.parametrize(
+    ("role", "name", "setting", "told"),
+    [
+        ("estimator", "alpha-beta", "bandwith_per_s", "bandwith_per_s; there are bandwidth_per_s, turn_share"),
+        ("controller", "even-flare", "sink", "sink; there are touchdown_sink_mps"),
+    ],
+)
+def test_a_setting_that_there_is_not(
+    role: str, name: str, setting: str, told: str, site: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(site))
+    overrides = {f"plug-ins.{role}": name, f"plug-ins.{role}_settings.{setting}": 1.0}
+    with pytest.raises(InputError, match=re.escape(f"there is no setting {told}")):
+        must_have_plug_ins(landsim.load_scenario("landing", overrides))
 
 
 @pytest.mark.slow

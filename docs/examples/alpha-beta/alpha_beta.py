@@ -1,6 +1,8 @@
 """Plug-ins for landsim: an estimator with fixed gains, and a flare that takes the sink off evenly with time."""
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -23,10 +25,18 @@ from landsim.plugins import (
 )
 
 
+def refuse_unknown(settings: Mapping[str, Any], *known: str) -> None:
+    """Refuse settings that nothing would read: one that is misspelt would change nothing, and nobody would notice."""
+    for name in settings:
+        if name not in known:
+            raise ValueError(f"there is no setting {name}; there are {', '.join(known)}")
+
+
 class AlphaBeta:
     """The inertial unit carries the state from frame to frame; each frame's pose takes it a fixed share of the way."""
 
     def __init__(self, setup: EstimatorSetup) -> None:
+        refuse_unknown(setup.settings, "bandwidth_per_s", "turn_share")
         self.setup = setup
         bandwidth = setup.settings.get("bandwidth_per_s", 1.0)
         if not 0.0 < bandwidth * setup.frame_dt < 0.5:
@@ -106,6 +116,7 @@ class EvenFlare:
     """Landsim's own guidance, but for a flare whose sink rate falls evenly with time instead of with the height."""
 
     def __init__(self, setup: ControllerSetup) -> None:
+        refuse_unknown(setup.settings, "touchdown_sink_mps")
         self.own = landsim_controller(setup)
         self.touchdown = setup.settings.get("touchdown_sink_mps", 0.4)
 
