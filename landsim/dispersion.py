@@ -20,6 +20,7 @@ from landsim.config import Scenario
 from landsim.errors import ScenarioError
 from landsim.scene import loading_of
 from landsim.schema import DispersionsConfig, DrawConfig, applied, drawable, refusal, value_of, with_values
+from landsim.schema.drawn import without_value
 from landsim.truth import Loading
 
 BRANCH = 0x64697370
@@ -316,4 +317,4 @@ def _told(scenario: Scenario, values: Mapping[str, float], key: str, what: str) 
     draw = config.draw[own[0]]
     open_ended = draw.distribution in {"normal", "log-normal"} or None in {draw.low, draw.high}
     advice = '; use "truncated-normal", with low and high, or "uniform"' if open_ended and draw.values is None else ""
-    return f"dispersions.draw[{own[0]}] gives {key} = {values[key]:g}, which {what}{advice}"
+    return f"dispersions.draw[{own[0]}] gives {key} = {values[key]:g}, which {without_value(what)}{advice}"

@@ -251,7 +251,8 @@ def test_paired_differences_are_over_the_pairs_that_have_both() -> None:
     differences = (second - first)[2:]
     assert found["n"] == 398
     assert found["mean"]["value"] == pytest.approx(differences.mean())
-    assert found["median"]["value"] == pytest.approx(np.median(differences))
+    averages = (differences[:, None] + differences)[np.triu_indices(398)] / 2.0
+    assert found["shift"]["value"] == pytest.approx(np.median(averages))
     # at n = 400 the bootstrap is Student's interval but for its own noise
     student = stats.mean_interval(differences)
     width = student.high - student.low  # type: ignore[operator]
@@ -259,6 +260,45 @@ def test_paired_differences_are_over_the_pairs_that_have_both() -> None:
     assert found["wilcoxon_p"] < 1e-30
     again = paired_differences(first, second, np.random.default_rng(0))
     assert again == found
+
+
+def test_the_shift_of_a_sample_as_published() -> None:
+    """Hamilton's depression scale before and after; M. Hollander and D. Wolfe, examples 3.1, 3.3 and 3.4."""
+    before = np.array([1.83, 0.50, 1.62, 2.48, 1.68, 1.88, 1.55, 3.06, 1.30])
+    after = np.array([0.878, 0.647, 0.598, 2.05, 1.06, 1.29, 1.06, 3.14, 1.29])
+    change = np.sort(after - before)
+    assert stats.walsh_median(change) == pytest.approx(-0.46)
+    assert tuple(stats.walsh_interval(change)) == pytest.approx((-0.786, -0.010))
+    assert stats.walsh_p(change) == pytest.approx(2.0 * 0.01953, abs=1e-5)
+
+
+@pytest.mark.parametrize("n", [7, 20, 51, 149])
+def test_signed_ranks_are_scipy_s(n: int) -> None:
+    sample = np.sort(np.random.default_rng(n).standard_normal(n) + 0.2)
+    assert stats.walsh_p(sample) == pytest.approx(scipy_stats.wilcoxon(sample, method="exact").pvalue)
+    averages = np.sort((sample[:, None] + sample)[np.triu_indices(n)] / 2.0)
+    assert stats.walsh_median(sample) == pytest.approx(np.median(averages), abs=1e-14)
+    assert set(stats.walsh_interval(sample)) <= set(averages)
+
+
+def test_many_signed_ranks_are_normal() -> None:
+    sample = np.sort(np.random.default_rng(0).standard_normal(400) + 0.1)
+    expected = scipy_stats.wilcoxon(sample, method="approx", correction=True).pvalue
+    assert stats.walsh_p(sample) == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_interval_leaves_zero_out_just_where_the_test_does() -> None:
+    """Also with ties and zeros, which round numbers have."""
+    rng = np.random.default_rng(1)
+    seen = set()
+    for _ in range(400):
+        sample = np.sort(rng.integers(-3, 6, rng.integers(1, 30)) / 4.0)
+        low, high = stats.walsh_interval(sample)
+        outside = low is not None and high is not None and not low <= 0.0 <= high
+        assert outside == (stats.walsh_p(sample) <= 1.0 - stats.CONFIDENCE)
+        seen.add(outside)
+    assert seen == {True, False}
+    assert stats.walsh_interval(np.arange(5.0)) == (None, None)  # five to one side happen in 1 of 16
 
 
 def test_equal_batches_differ_by_nothing() -> None:

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -201,14 +202,34 @@ def test_the_paper_s_bounds_and_the_published_limits_stand_beside_them() -> None
     found = summary([good(i, fused_error_cross_m=at) for i in range(20)])["envelopes"]
     early = one(found["bounds"], quantity="cross_m", stage="early")
     assert (early["value"], early["from_m"], early["to_m"]) == (0.5, 1000.0, 60.0)
-    assert early["p95_within_from_m"] == {"vision": 1000.0, "fused": 100.0}
+    assert early["p95"]["vision"] == {"state": "kept", "first_m": 1000.0, "last_m": 100.0, "within_from_m": 1000.0}
+    assert early["p95"]["fused"] == {"state": "broken", "first_m": 1000.0, "last_m": 100.0, "within_from_m": 100.0}
     late = one(found["bounds"], quantity="cross_m", stage="late")
-    assert (late["value"], late["p95_within_from_m"]["fused"]) == (0.2, None)
+    assert late["value"] == 0.2
+    assert late["p95"]["fused"] == {"state": "broken", "first_m": 0.0, "last_m": -100.0, "within_from_m": None}
     assert {bound["quantity"] for bound in found["bounds"]} == set(QUANTITIES)
     wayfinder = one(found["limits"], name="Wayfinder", quantity="cross_m")
     assert dict(zip(wayfinder["distance_m"], wayfinder["value"], strict=True))[860.0] == 18.4
     assert one(found["limits"], name="ICAO CAT IIIB", quantity="height_m")["value"] == [2.0, 2.0]
     assert all("no certification is claimed" in limit["source"] for limit in found["limits"])
+
+
+def test_a_limit_is_judged_as_far_as_the_flights_are_enough() -> None:
+    """Nineteen of twenty have an estimate at 100 m, none at 0 m; the Wayfinder's limit falls with the distance."""
+    rows = []
+    for i in range(20):
+        there = 0.1 if i else math.nan
+        rows.append(good(i, fused_error_cross_m=np.array([21.8, 0.1, there, math.nan, 0.1])))
+    found = summary(rows)["envelopes"]
+    early = one(found["bounds"], quantity="cross_m", stage="early")["p95"]["fused"]
+    assert early == {"state": "broken", "first_m": 1000.0, "last_m": 500.0, "within_from_m": 500.0}
+    # 18.4 m at 860 m and 33 m at 1450 m: at 1000 m 21.864 m
+    assert one(found["limits"], name="Wayfinder", quantity="cross_m")["p95"]["fused"]["state"] == "kept"
+    few = one(summary(rows[:19])["envelopes"]["bounds"], quantity="cross_m", stage="early")["p95"]["fused"]
+    assert few == {"state": "too few", "first_m": None, "last_m": None, "within_from_m": None}
+    blind = [good(i, vision_error_yaw_deg=np.full(5, math.nan)) for i in range(20)]
+    yaw = one(summary(blind)["envelopes"]["bounds"], quantity="yaw_deg", stage="early")["p95"]
+    assert (yaw["vision"]["state"], yaw["fused"]["state"]) == ("none", "kept")
 
 
 def test_consistency_is_over_flights_and_two_sided() -> None:
@@ -277,6 +298,38 @@ def test_what_matters_is_found_and_what_does_not_is_not() -> None:
     assert all(e["p_adjusted"] >= e["p"] for e in found["pairs"])
     (line,) = [line for line in found["text"] if line.startswith("sink rate")]
     assert "wind.head_mps (+" in line
+
+
+def test_a_start_that_a_dispersion_draws_is_counted_once() -> None:
+    rows = [row | {"draw.start.cross_m": row["start_cross_m"], "start_height_m": 60.0 + i} for i, row in
+            enumerate(drawn(50))]  # fmt: skip
+    found = summary(rows)["sensitivity"]
+    assert [entry["key"] for entry in found["inputs"]] == [
+        "wind.head_mps", "loading.extra_mass_kg", "start.cross_m", "start_height_m",
+    ]  # fmt: skip
+
+
+def test_an_ellipse_takes_as_many_touchdowns_as_its_level_asks_for() -> None:
+    """Of five, 99.7 % would reach ten times as far as they lie apart."""
+    places = default_rng(2).normal(0.0, (10.0, 0.3), (20, 2))
+    for n, levels in ((4, []), (5, [50.0]), (10, [50.0, 95.0]), (20, [50.0, 95.0, 99.7])):
+        found = summary([good(i, x_m=275.0 + x, y_m=y) for i, (x, y) in enumerate(places[:n].tolist())])["touchdown"]
+        assert [one["level"] for one in found["ellipses"] if one["center"] is not None] == levels
+        assert any("99.7 % takes 20" in text for text in found["text"]) == (4 < n < 20)
+
+
+def test_sentences_have_numbers_as_tables_have_them() -> None:
+    found = summary([good(i, nees9_mean_early=1619.0 + i % 3) for i in range(30)])
+    (line,) = [text for text in found["consistency"]["text"] if text.startswith("early, 9 states")]
+    assert "mean 1620 (" in line
+    texts = [*found["consistency"]["text"], *found["rates"]["text"], *found["touchdown"]["text"]]
+    assert not [text for text in texts if re.search(r"\de[+-]\d", text)]
+    assert "1·10⁻⁶" in found["rates"]["text"][3]
+
+
+def test_the_seeds_that_were_flown_are_said() -> None:
+    assert summary([good(i) for i in (7, 4, 9)])["batch"]["seeds"] == [4, 9]
+    assert summary([])["batch"]["seeds"] is None
 
 
 def test_the_worst_are_those_that_failed_and_then_those_nearest_a_limit() -> None:

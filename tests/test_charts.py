@@ -1,7 +1,7 @@
 """Charts: what they draw stands in the summary, on axes that can show it, alike by either renderer."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from landsim.charts.model import (
     Curve,
     Histogram,
     Limit,
+    Note,
     Panel,
     Points,
     Region,
@@ -32,7 +33,8 @@ from landsim.charts.model import (
 )
 from landsim.charts.navigation import clipped
 from landsim.charts.shared import number, percent, with_unit
-from landsim.page.figure import panel_figure
+from landsim.log import QUANTITIES
+from landsim.page.figure import chart_figures, panel_figure
 from landsim.plots.chart import chart_figure, draw_chart
 
 ROUNDING = 1e-9
@@ -191,15 +193,98 @@ def test_the_share_beyond_goes_down_in_steps_and_its_band_on_to_the_limit() -> N
     assert (limit.at, limit.label) == (1.0, "limit 1 m/s")
 
 
-def test_a_rate_of_none_is_a_bar_without_a_point() -> None:
-    chart = batch_charts(summary([good(i) for i in range(10)]))["outcomes"][0]
-    points = chart.panels[1].series[0]
-    assert isinstance(points, Points)
-    assert set(points.x) == {None}
-    assert points.x_bar is not None
-    assert points.x_bar[1] == pytest.approx([100.0 * (1.0 - 0.025**0.1)] * 6)
-    assert chart.panels[1].x.span is not None
-    assert set(points.x_bar[0]) == {chart.panels[1].x.span[0]}
+def test_a_rate_of_none_is_a_pale_bar_without_a_point() -> None:
+    """One of ten beyond the lateral limit: the other five limits have an upper end alone."""
+    rows = [good(i) for i in range(9)] + [good(9, y_m=2.5, in_box=False)]
+    panel = batch_charts(summary(rows))["outcomes"][0].panels[1]
+    some, none = panel.series
+    assert isinstance(some, Points)
+    assert isinstance(none, Points)
+    assert (some.x, some.tone, none.tone) == ((10.0,), "vermilion", "grey")
+    assert (some.mark, none.mark) == ("dot", "none")
+    assert panel.y.ticks[int(some.y[0] or 0)] == "|lateral touchdown| > 2 m"
+    assert set(none.x) == {None}
+    assert none.x_bar is not None
+    assert none.x_bar[1] == pytest.approx([100.0 * (1.0 - 0.025**0.1)] * 5)
+    assert panel.x.span is not None
+    assert set(none.x_bar[0]) == {panel.x.span[0]}
+
+
+def test_where_no_limit_was_missed_a_sentence_says_so() -> None:
+    (chart,) = batch_charts(summary([good(i) for i in range(10)]))["outcomes"]
+    assert [panel.title for panel in chart.panels] == ["how the flights ended"]
+    assert "No flight was beyond a limit" in chart.caption
+    assert "up to 30.85 %" in chart.caption  # 1 - 0.025^(1/10)
+
+
+def legend(charts: Sequence[Chart]) -> set[str]:
+    return {series.name for chart in charts for panel in chart.panels for series in panel.series if series.legend}
+
+
+def test_a_percentile_is_in_the_legend_where_there_are_flights_for_it_and_nowhere_else() -> None:
+    errors = {f"{source}_error_cross_m": np.full(5, 0.3) for source in ("vision", "fused")}
+    for n, there in (
+        (1, set()),
+        (2, {"50 %"}),
+        (19, {"50 %"}),
+        (20, {"50 %", "95 %"}),
+        (371, {"50 %", "95 %", "99.73 %"}),
+    ):
+        position = batch_charts(summary([good(i, **errors) for i in range(n)]))["navigation"][0]
+        named = {name.partition(",")[0] for name in legend([position]) if name.endswith((", vision", ", fused"))}
+        assert named == there
+        assert "95 % takes 20" in position.caption
+        notes = {note.text for panel in position.panels for note in panel.mentions if isinstance(note, Note)}
+        assert notes == (set() if there else {"too few flights: 50 % takes 2"})
+    curves = [s for s in position.panels[2].series if isinstance(s, Curve) and s.name.endswith("vision")]
+    assert len({(one.dash, one.width) for one in curves}) == 3  # told apart without a colour
+
+
+def test_what_an_estimator_does_not_give_is_not_in_the_legend() -> None:
+    nothing = np.full(5, np.nan)
+    rows = [good(i, **{f"sigma_{q}": nothing for q in QUANTITIES}) for i in range(20)]
+    assert not [name for name in legend(batch_charts(summary(rows))["navigation"]) if "predicts" in name]
+    rows = [good(i, **{f"fused_error_{q}": nothing for q in QUANTITIES}) for i in range(20)]
+    charts = batch_charts(summary(rows))["navigation"]
+    assert not [name for name in legend(charts) if name.endswith("fused")]
+    assert "no fused estimate" in [note.text for note in charts[0].panels[1].mentions if isinstance(note, Note)]
+
+
+def test_of_one_value_there_is_a_line_and_of_one_touchdown_no_close_view() -> None:
+    charts = batch_charts(summary([good(0)]))
+    (shown,) = charts["distributions"][0].panels[0].series
+    assert isinstance(shown, Points)
+    assert (shown.x, shown.y, shown.y_bar) == ((0.5,), (1,), ((0,), (1,)))
+    assert len(charts["touchdown"][0].panels) == 1
+
+
+def test_a_figure_says_of_which_flights_it_is() -> None:
+    charts = charts_of(summary([good(i) for i in range(5, 9)]))
+    assert {chart.subtitle for chart in charts} == {"landing: 4 flights, seeds 5 to 8"}
+    assert {chart.subtitle for chart in charts_of(summary([good(3)], shard="2/3"))} == {
+        "landing: 1 flight, seed 3, shard 2/3"
+    }
+    words = [text.get_text() for text in chart_figure(charts[0]).texts]
+    assert "landing: 4 flights, seeds 5 to 8" in words
+    sides = {chart.subtitle for chart in charts_of(comparison(**COMPARISONS["ordinary"]))}
+    assert sides == {"points = landing: 60 flights, seeds 0 to 59; ends = landing: 60 flights, seeds 0 to 59"}
+
+
+def test_panels_side_by_side_are_in_line() -> None:
+    for chart in charts_of(summary(BATCHES["ordinary"])):
+        layouts = [figure["layout"] for figure in chart_figures(chart)]
+        assert len({one["margin"]["l"] for one in layouts}) == 1
+        for first in range(0, len(layouts), chart.columns):
+            row = layouts[first : first + chart.columns]
+            assert len({(one["height"], one["margin"]["t"], one["margin"]["b"]) for one in row}) == 1
+
+
+def test_a_logarithmic_axis_has_no_digits_over_each_other() -> None:
+    """Powers of ten alone, or 2 and 5 besides where there are fewer than one and a third of them."""
+    for span, dtick in (((0.01, 100.0), 1), ((0.1, 2.1), 1), ((1.0, 10.0), "D2")):
+        curve = Curve("", (0.0, 1.0), span)
+        axis = panel_figure(Panel(Axis("x"), Axis("y", log=True, span=span), (curve,)))["layout"]["yaxis"]
+        assert axis["dtick"] == dtick
 
 
 def test_envelopes_have_the_paper_s_bounds_and_the_published_limits(summaries: dict[str, dict[str, Any]]) -> None:
@@ -283,6 +368,8 @@ def test_an_axis_reaches_its_data_limits_and_regions() -> None:
 
 def test_numbers_are_written_for_people() -> None:
     assert [number(v) for v in (None, 0.0, -1.5, 123456.0, 1e-6)] == ["–", "0", "−1.5", "1.23·10⁵", "1·10⁻⁶"]
+    assert [number(v) for v in (1619.0, -1000.0, 99_900.0, -0.0)] == ["1620", "−1000", "99900", "0"]
+    assert [with_unit(v, "deg", sign=True) for v in (0.5, -0.5, 0.0, None)] == ["+0.5°", "−0.5°", "0°", "?"]
     assert (with_unit(3.0, "deg"), with_unit(3.0, "m/s"), with_unit(None, "m")) == ("3°", "3 m/s", "–")
     assert (percent(1.0), percent(0.98172), percent(None)) == ("100 %", "98.17 %", "–")
 

@@ -40,7 +40,7 @@ DRAWS: list[tuple[dict[str, Any], str]] = [
         'apply (camera.focal_length_error): must be "replace", "add" or "multiply", not "adds"; did you',
     ),
     ({"apply": "multiply"}, 'apply: camera.focal_length_error is 0 and stays 0 whatever multiplies it; use "add"'),
-    ({"mean": 0.9}, "mean: 0.9 is drawn, but camera.focal_length_error must be at most 0.5, not 0.9"),
+    ({"mean": 0.9}, "mean: 0.9 is drawn, but camera.focal_length_error must be at most 0.5"),
     (
         {"key": "camera.focal_lenght_mm"},
         'key: there is no key "camera.focal_lenght_mm" to draw; did you mean camera.foc',
@@ -83,7 +83,7 @@ OTHERS: list[tuple[dict[str, Any], str]] = [
     ({"distribution": "truncated-normal", "mean": 1.0, "sigma": 1.0}, "low (camera.noise_px): is missing; without low"),
     (
         {"distribution": "truncated-normal", "mean": 1.0, "sigma": 1.0, "low": -1.0},
-        "low: -1 is drawn, but camera.noise_px must be at least 0, not -1.0",
+        "low: -1 is drawn, but camera.noise_px must be at least 0",
     ),
     (
         {"distribution": "truncated-normal", "mean": 1.0, "sigma": 0.1, "low": 2.0},
@@ -120,6 +120,46 @@ OTHERS: list[tuple[dict[str, Any], str]] = [
 def test_another_distribution(parameters: dict[str, Any], told: str) -> None:
     told = f"dispersions.draw[0].{told}"
     assert refusal({"draw": [{"key": "camera.noise_px", **parameters}]}).startswith(told)
+
+
+TAILS: list[tuple[dict[str, Any], str]] = [
+    (
+        {"distribution": "normal", "mean": 1.0, "sigma": 1.0},
+        'sigma: normal draws -5 too, 6 sigma out, but camera.noise_px must be at least 0; use "truncated-normal"',
+    ),
+    (
+        {"distribution": "normal", "apply": "add", "mean": 0.0, "sigma": 1.0},
+        "sigma: normal draws -5.5 too, 6 sigma out, but camera.noise_px must be at least 0, not -5.5; use",
+    ),
+    (
+        {"distribution": "truncated-normal", "mean": 1.0, "sigma": 1.0, "high": 2.0},
+        "sigma: truncated-normal draws -5 too, 6 sigma out, but camera.noise_px must be at least 0; use",
+    ),
+    (
+        {"key": "camera.noise_factor", "distribution": "log-normal", "median": 1.0, "sigma_log": 1.0},
+        "sigma_log: log-normal draws 403.4 too, 6 sigma out, but camera.noise_factor must be at most 100; use",
+    ),
+    (  # cut 5 sigma above the mean: what is left has its billionth part beyond sqrt(5² + 6²) = 7.81 sigma
+        {"key": "camera.noise_factor", "distribution": "truncated-normal", "mean": 0.0, "sigma": 13.0, "low": 65.0},
+        "sigma: truncated-normal draws 101.5 too, 7.81 sigma out, but camera.noise_factor must be at most 100; use",
+    ),
+    (
+        {"key": "runway.length_m", "distribution": "normal", "mean": 2000.0, "sigma": 400.0},
+        "sigma: normal draws -400 too, 6 sigma out, but runway.length_m must be above 0; use",
+    ),
+]
+
+
+@pytest.mark.parametrize(("changes", "told"), TAILS, ids=[told[:35] for _, told in TAILS])
+def test_what_a_distribution_without_an_end_draws(changes: dict[str, Any], told: str) -> None:
+    draw = {"key": "camera.noise_px", **changes}
+    assert refusal({"draw": [draw]}, others={"camera.noise_px": 0.5}).startswith(f"dispersions.draw[0].{told}")
+
+
+def test_what_next_to_no_flight_draws_is_not_refused() -> None:
+    """Zero is 6.25 sigma from the mean, and 1.2e-10 of all numbers lie below it."""
+    draw = {"key": "camera.noise_px", "distribution": "normal", "mean": 1.0, "sigma": 0.16}
+    assert load_scenario("landing", {"dispersions": {"draw": [draw]}}).dispersions is not None
 
 
 def test_a_speed_that_is_the_aircraft_s_own_has_nothing_to_add_to() -> None:

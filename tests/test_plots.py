@@ -181,9 +181,47 @@ def test_signed_roots_there_and_back() -> None:
     np.testing.assert_array_equal(navigation.signed_square(navigation.signed_root(values)), values)
 
 
-@pytest.mark.parametrize(("value", "expected"), [(7.9, 5.0), (5.0, 5.0), (0.03, 0.02), (1.0, 1.0), (199.0, 100.0)])
+@pytest.mark.parametrize(("value", "expected"), [(7.9, 4.0), (8.0, 8.0), (0.03, 0.02), (1.0, 0.8), (199.0, 80.0)])
 def test_ticks_are_round(value: float, expected: float) -> None:
     assert navigation.round_below(value) == pytest.approx(expected, rel=1e-12)
+
+
+def test_numbers_on_an_axis_of_square_roots_are_evenly_spaced(flight: dict[str, Array]) -> None:
+    figure = plots.navigation_errors(flight, SCENARIO, measured(flight))
+    axes = next(a for a in figure.axes if a.get_ylabel() == "cross error, m")
+    roots = navigation.signed_root(np.asarray(axes.get_yticks()))
+    assert roots.size == 5
+    np.testing.assert_allclose(np.diff(roots), roots[-1] / 2.0)
+    assert roots[-1] < navigation.signed_root(np.array(axes.get_ylim()[1]))
+
+
+def test_an_estimator_without_covariance_has_its_errors_drawn_and_its_silence_told(flight: dict[str, Array]) -> None:
+    log = {
+        name: np.full_like(v, np.nan) if name.startswith(("sigma_", "nees", "nis")) else v for name, v in flight.items()
+    }
+    metrics = measured(log)
+    figure = plots.navigation_errors(log, SCENARIO, metrics)
+    axes = next(a for a in figure.axes if a.get_ylabel() == "cross error, m")
+    _, shown = line(axes, "fused, at camera frames")
+    expected = (flight["fused_cross_m"] - flight["true_cross_m"])[np.isfinite(flight["accepted"])]
+    np.testing.assert_allclose(shown, expected, atol=1e-12)
+    assert np.isfinite(shown).sum() > 100
+    assert "no covariance given" in text_of(figure)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["vision", "fused, at camera frames"]
+    figure = plots.consistency(log, SCENARIO, metrics)
+    panels = [axes for axes in figure.axes if axes.get_ylabel()]
+    assert all("no covariance given" in [t.get_text() for t in axes.texts][-1] for axes in panels)
+    assert not figure.legends
+
+
+def test_what_is_zero_throughout_is_named_and_not_drawn(flight: dict[str, Array]) -> None:
+    high = {name: values[:1150] for name, values in flight.items()} | {"steering": np.zeros(1150)}
+    figure = plots.controls_and_attitude(high, SCENARIO, measured(high, "diverged"))
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert not [label for label in labels if "weight" in label or "steering" in label]
+    assert len(labels) == 8
+    assert "zero throughout: steering, weight on wheel" in text_of(figure)
+    assert sum(bool(axes.get_xlabel()) for axes in figure.axes) == 2
 
 
 def test_six_moments_in_order(flight: dict[str, Array]) -> None:

@@ -13,6 +13,7 @@ from landsim.batch.paired import mcnemar, paired_differences, rate_difference, t
 from landsim.batch.row import DRAW
 from landsim.batch.sections.envelopes import bands, in_the_air, paper_bounds
 from landsim.batch.sections.sensitivity import RESULTS
+from landsim.batch.sections.words import number, signed, span_of, with_unit
 from landsim.batch.stats import CONFIDENCE, SIGNIFICANT, adjusted, exceedance, rate
 from landsim.config import Scenario, ScenarioFile
 from landsim.errors import InputError
@@ -48,15 +49,15 @@ def compare(batches: Sequence[Batch | tuple[str, Scenario, Flights]]) -> dict[st
         As JSON has it.
 
         ====================  ======================================================================================
-        ``batches``           [``name``, ``scenario``, ``n``, ``success``: rate, ``landed``: rate, ``limits``:
-                              [``key``, rate of those that missed it]]
+        ``batches``           [``name``, ``scenario``, ``n``, ``seeds`` [first, last], ``success``: rate, ``landed``:
+                              rate, ``limits``: [``key``, rate of those that missed it]]
         ``settings``          scenario keys that differ: [``key``, ``values``: one a batch, None where it has none]
         ``pairs``             each batch with the reference: [``reference``, ``other``, ``seeds`` in common,
                               ``same_draws``, ``success``: {``both``, ``reference_only``, ``other_only``, ``neither``,
                               ``difference``, ``low``, ``high``, ``mcnemar_p``}, ``metrics``: [``key``, ``title``,
-                              ``unit``, ``n``, ``mean`` and ``median`` {``value``, ``low``, ``high``}, ``wilcoxon_p``,
+                              ``unit``, ``n``, ``mean`` and ``shift`` {``value``, ``low``, ``high``}, ``wilcoxon_p``,
                               ``p_adjusted`` for their number, ``significant``], ``text``]; a difference is the other
-                              less the reference
+                              less the reference, its shift Hodges and Lehmann's
         ``distributions``     [``key``, ``title``, ``unit``, ``edges``, ``limits``, ``batches``: [``name``, ``n``,
                               ``counts``, ``ecdf`` {``x``, ``share``}, ``exceedance``]]
         ``envelopes``         ``distance_m``, ``series``: [``source``, ``quantity``, ``unit``, ``batches``: [``name``,
@@ -102,6 +103,7 @@ def _overview(batch: Batch) -> dict[str, Any]:
         "name": batch.name,
         "scenario": batch.scenario.name,
         "n": flights.n,
+        "seeds": span_of(flights.columns["seed"]),
         "success": rate(int(flights.flags("in_box").sum()), flights.n),
         "landed": rate(int(flights.are("outcome", "landed").sum()), flights.n),
         "limits": limits,
@@ -197,23 +199,26 @@ def _same_draws(first: Flights, second: Flights, here: list[int], there: list[in
 def _text(pair: dict[str, Any]) -> list[str]:
     s, other, reference = pair["success"], pair["other"], pair["reference"]
     found = [
-        f"{metric['title']} {_signed(metric['median']['value'])} {metric['unit']}"
-        f" ({_signed(metric['median']['low'])} to {_signed(metric['median']['high'])})"
+        f"{metric['title']} {with_unit(metric['shift']['value'], metric['unit'], sign=True)}"
+        f" ({signed(metric['shift']['low'])} to {signed(metric['shift']['high'])})"
         for metric in pair["metrics"]
         if metric["significant"]
     ]
-    p = "" if s["mcnemar_p"] is None else f" (McNemar's exact p {s['mcnemar_p']:.3g})"
+    p = "" if s["mcnemar_p"] is None else f" (McNemar's exact p {number(s['mcnemar_p'])})"
     outcome = (
         f"Of {pair['seeds']} common seeds {s['both']} succeeded in both, {s['reference_only']} in {reference} alone,"
         f" {s['other_only']} in {other} alone, {s['neither']} in neither."
     )
     difference = (
-        f"The success rate of {other} less that of {reference} is {_signed(100.0 * s['difference'])} points, between"
-        f" {_signed(100.0 * s['low'])} and {_signed(100.0 * s['high'])} with {100.0 * CONFIDENCE:g} % confidence{p}."
+        f"The success rate of {other} less that of {reference} is {signed(100.0 * s['difference'])} points, between"
+        f" {signed(100.0 * s['low'])} and {signed(100.0 * s['high'])} with {100.0 * CONFIDENCE:g} % confidence{p}."
     )
     others = f"No other number of {other} differs significantly from that of {reference}."
     if found:
-        others = f"Median of {other} less {reference}, where the signed ranks differ significantly: {'; '.join(found)}."
+        others = (
+            f"Shift of {other} from {reference} (Hodges–Lehmann), where Wilcoxon's signed ranks differ significantly:"
+            f" {'; '.join(found)}."
+        )
     text = [outcome, difference, others]
     if not pair["same_draws"]:
         text.append(
@@ -221,10 +226,6 @@ def _text(pair: dict[str, Any]) -> list[str]:
             " and the pairing removes less of the scatter."
         )
     return text
-
-
-def _signed(value: float | None) -> str:
-    return "?" if value is None else "0" if value == 0.0 else f"{value:+.3g}".replace("-", "−")
 
 
 def _distributions(batches: Sequence[Batch]) -> list[dict[str, Any]]:

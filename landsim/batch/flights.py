@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from estimator.so3 import Array
 from landsim.batch.row import ARRAYS, DRAW, SCALARS
+from landsim.batch.rows import check_columns
 from landsim.errors import RunFolderError
 from landsim.parquet import read_schema, read_table
 
@@ -89,11 +90,9 @@ def load_flights(path: Path) -> Flights:
     RunFolderError
         If the file is not there, is not Parquet, or holds no flights that can be laid over each other.
     """
-    names = read_schema(path).names
-    missing = [name for name in (*SCALARS, *ARRAYS) if name not in names]
-    if missing:
-        raise RunFolderError(f"{path}: is not a table of flights: column {missing[0]} is missing")
-    table = read_table(path, [name for name in names if name in SCALARS or name.startswith(DRAW)])
+    schema = read_schema(path)
+    check_columns(schema, path)
+    table = read_table(path, [name for name in schema.names if name in SCALARS or name.startswith(DRAW)])
     columns = {name: _column(name, table[name].to_pylist()) for name in table.column_names}
     flights = Flights(table.num_rows, columns, _Stored(path))
     if flights.n:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from estimator.so3 import Array
-from landsim.batch.stats import CONFIDENCE, NOTHING, Interval, quantile_interval
+from landsim.batch.stats import CONFIDENCE, NOTHING, Interval, walsh_interval, walsh_median, walsh_p
 
 RESAMPLES = 1999
 """Of a bootstrap."""
@@ -83,20 +83,21 @@ def paired_differences(first: Array, second: Array, rng: Generator) -> dict[str,
     Returns
     -------
     dict
-        ``n`` pairs; ``mean`` with a bootstrap interval over pairs; ``median`` with an interval of order statistics;
-        ``wilcoxon_p`` of the signed ranks, None if every difference is zero.
+        ``n`` pairs; ``mean`` with a bootstrap interval over pairs; ``shift``, Hodges and Lehmann's estimate, with the
+        interval that Wilcoxon's signed ranks do not refuse; ``wilcoxon_p`` of the same ranks, None if every
+        difference is zero: below 1 - `CONFIDENCE` just where the interval leaves zero out.
     """
     there = np.isfinite(first) & np.isfinite(second)
     difference = np.sort(second[there] - first[there])
     n = int(difference.size)
     if n == 0:
         nothing = {"value": None, "low": None, "high": None}
-        return {"n": 0, "mean": dict(nothing), "median": dict(nothing), "wilcoxon_p": None}
+        return {"n": 0, "mean": dict(nothing), "shift": dict(nothing), "wilcoxon_p": None}
     return {
         "n": n,
         "mean": {"value": float(difference.mean()), **_bootstrap_mean(difference, rng)._asdict()},
-        "median": {"value": float(np.median(difference)), **quantile_interval(difference, 0.5)._asdict()},
-        "wilcoxon_p": float(stats.wilcoxon(difference).pvalue) if difference.any() else None,
+        "shift": {"value": walsh_median(difference), **walsh_interval(difference)._asdict()},
+        "wilcoxon_p": walsh_p(difference) if difference.any() else None,
     }
 
 

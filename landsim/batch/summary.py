@@ -13,6 +13,7 @@ from landsim.batch.sections.rates import rates
 from landsim.batch.sections.sensitivity import sensitivity
 from landsim.batch.sections.touchdown import touchdown
 from landsim.batch.sections.tracking import tracking
+from landsim.batch.sections.words import span_of
 from landsim.batch.sections.worst import worst
 from landsim.batch.stats import CONFIDENCE
 from landsim.config import Scenario
@@ -44,8 +45,8 @@ def summarise(scenario: Scenario, flights: Flights, identity: Mapping[str, Any])
 
         ========================  ==================================================================================
         ``batch``                 ``scenario``, ``aircraft``, ``n`` (flights), ``asked`` (flights asked for), ``seed``,
-                                  ``shard``, ``sampling``, ``draws`` (keys), ``confidence`` of every interval,
-                                  ``engine``, ``workers``, ``wall_time_s``,
+                                  ``seeds`` [first, last] of those here, ``shard``, ``sampling``, ``draws`` (keys),
+                                  ``confidence`` of every interval, ``engine``, ``workers``, ``wall_time_s``,
                                   ``flights_per_second``, ``flight_wall_time_s`` {``median``, ``p95``}
         ``rates``                 ``success`` (landed in the box) and ``landed``: rates; ``outcomes``: [``outcome``,
                                   rate]; ``limits``: [``key``, ``title``, ``unit``, ``limit``, ``side``, ``of``, rate
@@ -63,9 +64,11 @@ def summarise(scenario: Scenario, flights: Flights, identity: Mapping[str, Any])
         ``envelopes``             ``distance_m``, ``in_the_air``, ``series``: [``source``, ``quantity``, ``unit``,
                                   ``p50``, ``p68``, ``p95``, ``p99_7``, ``p95_low``, ``p95_high``, ``count``,
                                   ``share``, ``sigma_rms`` if fused]; ``bounds`` (the paper's): [``quantity``,
-                                  ``stage``, ``value``, ``from_m``, ``to_m``, ``p95_within_from_m``, ``source``];
+                                  ``stage``, ``value``, ``from_m``, ``to_m``, ``p95``, ``source``];
                                   ``limits`` (published): [``name``, ``quantity``, ``distance_m``, ``value``,
-                                  ``source``]; ``text``
+                                  ``p95``, ``source``]; their ``p95`` says of each source whether its 95th percentile
+                                  keeps to it: ``state`` (kept, broken, too few flights, none), ``first_m`` and
+                                  ``last_m`` of the distances judged, ``within_from_m``; ``text``
         ``consistency``           ``nees``: [``key``, ``phase``, ``dof``, ``flights``, ``frames``, ``mean``, ``low``,
                                   ``high``, ``median`` {``value``, ``low``, ``high``}, ``bound_low``,
                                   ``bound_high``, ``errors_over_sigma``, ``verdict``];
@@ -110,6 +113,7 @@ def _batch(scenario: Scenario, flights: Flights, identity: Mapping[str, Any], sa
         "n": flights.n,
         "asked": identity.get("n", flights.n),
         "seed": identity.get("seed"),
+        "seeds": span_of(flights.columns["seed"]),
         "shard": identity.get("shard"),
         "sampling": sampling,
         "draws": list(flights.draws),

@@ -1,9 +1,11 @@
 """Charts of batches side by side, from their comparison alone: what is drawn stands in compare.json."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
-from landsim.charts.landing import BANDED, FIRST
+from landsim.batch.sections.words import flights_for
+from landsim.charts.landing import FIRST, NO_LIMIT_MISSED, NONE_MISSED
 from landsim.charts.model import Axis, Chart, Curve, Dash, Histogram, Limit, Panel, Points, Series, Tone
 from landsim.charts.navigation import GROUPS, bounds_of, error_span
 from landsim.charts.shared import (
@@ -12,10 +14,12 @@ from landsim.charts.shared import (
     beyond,
     distance_axis,
     floor_of,
+    flown,
     limits_near,
     number,
     rates,
     share_floor,
+    there,
     unit_of,
     with_unit,
 )
@@ -39,12 +43,14 @@ def comparison_charts(compared: Mapping[str, Any]) -> dict[str, tuple[Chart, ...
     dict of str to tuple of Chart
         A section has none where there is nothing to show.
     """
-    return {
+    of = "; ".join(f"{one['name']} = {flown(one['scenario'], one['n'], one['seeds'])}" for one in compared["batches"])
+    sections = {
         "outcomes": _rates(compared),
         "differences": _differences(compared),
         "distributions": _distributions(compared),
         "navigation": _envelopes(compared),
     }
+    return {section: tuple(replace(chart, subtitle=of) for chart in charts) for section, charts in sections.items()}
 
 
 def _look(compared: Mapping[str, Any], name: str) -> tuple[Tone, Dash]:
@@ -69,7 +75,7 @@ def _rates(compared: Mapping[str, Any]) -> tuple[Chart, ...]:
     )
     panels = [ended]
     keys = list(dict.fromkeys(limit["key"] for one in batches for limit in one["limits"] if limit["rate"] is not None))
-    if keys:
+    if any(limit["count"] for one in batches for limit in one["limits"]):
         every = [limit for one in batches for limit in one["limits"] if limit["rate"] is not None]
         floor = floor_of(every)
         titles = {limit["key"]: limit["title"] for limit in every}
@@ -84,14 +90,15 @@ def _rates(compared: Mapping[str, Any]) -> tuple[Chart, ...]:
                 Axis("share of the flights beyond it", "%", log=True, span=(floor, 130.0)),
                 Axis("", ticks=names),
                 tuple(series),
-                title="limits of the box that were missed; a bar without a point: no flight was beyond it",
+                title=f"limits of the box that were missed; {NONE_MISSED}",
                 height=0.3 + 0.08 * len(keys) * max(len(batches), 2),
             )
         )
     return (
         Chart(
             "compare-rates", "Success and missed limits, side by side", tuple(panels), 1,
-            "Each batch by itself; the bars are two-sided Clopper–Pearson intervals with 95 % confidence.",
+            "Each batch by itself; the bars are two-sided Clopper–Pearson intervals with 95 % confidence."
+            + ("" if len(panels) > 1 else NO_LIMIT_MISSED),
         ),
     )  # fmt: skip
 
@@ -111,7 +118,7 @@ def _differences(compared: Mapping[str, Any]) -> tuple[Chart, ...]:
                 (row, m)
                 for row, pair in enumerate(pairs)
                 for m in pair["metrics"]
-                if m["key"] == key and m["median"]["value"] is not None and bool(m["significant"]) is significant
+                if m["key"] == key and m["shift"]["value"] is not None and bool(m["significant"]) is significant
             ]
             if own:
                 series.append(_forest(own, metric["unit"], significant=significant))
@@ -122,21 +129,22 @@ def _differences(compared: Mapping[str, Any]) -> tuple[Chart, ...]:
             )
         )  # fmt: skip
     caption = (
-        f"Median of the other batch less {reference} over common seeds, with its distribution-free 95 % interval;"
-        " filled where Wilcoxon's signed ranks, adjusted for their number, differ significantly from none."
+        f"Shift from {reference} over common seeds by Hodges and Lehmann, with the 95 % interval of Wilcoxon's signed"
+        " ranks; filled where these, adjusted for their number, differ significantly from none: then the interval"
+        " leaves zero out."
     )
     return (Chart("compare-differences", f"Differences from {reference}", tuple(panels), 3, caption),)
 
 
 def _forest(own: Sequence[tuple[int, Mapping[str, Any]]], unit: str, *, significant: bool) -> Points:
-    x = tuple(m["median"]["value"] for _, m in own)
+    x = tuple(m["shift"]["value"] for _, m in own)
     low, high = (
-        tuple(m["median"]["value"] if m["median"][end] is None else m["median"][end] for _, m in own)
+        tuple(m["shift"]["value"] if m["shift"][end] is None else m["shift"][end] for _, m in own)
         for end in ("low", "high")
     )
     hover = tuple(
-        f"median {with_unit(m['median']['value'], unit)}"
-        f" ({number(m['median']['low'])} to {number(m['median']['high'])})\n"
+        f"shift {with_unit(m['shift']['value'], unit)}"
+        f" ({number(m['shift']['low'])} to {number(m['shift']['high'])})\n"
         f"{m['n']} pairs, adjusted p {number(m['p_adjusted'])}"
         for _, m in own
     )
@@ -151,6 +159,7 @@ def _distributions(compared: Mapping[str, Any]) -> tuple[Chart, ...]:
     first = [entry for key in FIRST for entry in entries if entry["key"] == key]
     others = [entry for entry in entries if entry["key"] not in FIRST]
     charts = []
+    banded = "; the tint is its 95 % confidence" if _banded(compared) else ""
     for name, title, chosen in (
         ("compare-distributions", "Distributions at touchdown, and how many flights go beyond a value", first),
         ("compare-distributions-more", "Attitude at touchdown and the stop, and how many go beyond a value", others),
@@ -160,9 +169,14 @@ def _distributions(compared: Mapping[str, Any]) -> tuple[Chart, ...]:
                 panel for entry in chosen for panel in (_overlaid(compared, entry), _beyond(compared, entry))
             )
             charts.append(
-                Chart(name, title, panels, 2, f"Left: share of each batch's flights a bin. Right: share{BANDED}.")
+                Chart(name, title, panels, 2, f"Left: share of each batch's flights a bin. Right: share{banded}.")
             )
     return tuple(charts)
+
+
+def _banded(compared: Mapping[str, Any]) -> bool:
+    """Whether the confidence is tinted: three tints over each other are none."""
+    return len(compared["batches"]) <= 2
 
 
 def _overlaid(compared: Mapping[str, Any], entry: Mapping[str, Any]) -> Panel:
@@ -187,7 +201,7 @@ def _beyond(compared: Mapping[str, Any], entry: Mapping[str, Any]) -> Panel:
     floor = share_floor(curve for _, curve in curves)
     series: list[Series] = []
     for name, curve in curves:
-        series += beyond(name, curve, None, None, floor, *_look(compared, name))
+        series += beyond(name, curve, None, None, floor, *_look(compared, name), band=_banded(compared))
     values = dict.fromkeys(limit["value"] for limit in entry["limits"] if limit["side"] == "above")
     seen = [x for _, curve in curves for x in curve["x"]]
     labelled = [(value, with_unit(value, entry["unit"])) for value in values]
@@ -208,7 +222,7 @@ def _envelopes(compared: Mapping[str, Any]) -> tuple[Chart, ...]:
         panels = tuple(_envelope(compared, found, source, name) for name in names for source in SOURCES)
         caption = (
             "Magnitude of the error that 50 % (thin) and 95 % (thick) of the flights with an estimate at a distance"
-            " stay below. The paper's bounds are those that its authors state."
+            f" stay below; 95 % takes {flights_for(95.0)} flights. The paper's bounds are those that its authors state."
         )
         charts.append(Chart(f"compare-errors-{group}", f"Navigation errors by range: {group}", panels, 2, caption))
     return tuple(charts)
@@ -224,7 +238,8 @@ def _envelope(compared: Mapping[str, Any], found: Mapping[str, Any], source: str
         for key, width in (("p50", 0.6), ("p95", 1.5)):
             level = f"{key[1:]} %"
             values = tuple(None if value is None else max(value, span[0]) for value in one[key])
-            series.append(Curve(f"{one['name']}, {level}", distances, values, tone, dash, width))
+            if there(values):
+                series.append(Curve(f"{one['name']}, {level}", distances, values, tone, dash, width))
     name = QUANTITIES[quantity]
     return Panel(
         distance_axis(distances), Axis(f"|{name} error|", unit_of(of["unit"]), log=True, span=span),

@@ -1,6 +1,7 @@
 """How often a batch landed, where, and how well: charts of the summary's rates, touchdown, distributions, tracking."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from landsim.charts.model import (
@@ -34,6 +35,8 @@ ELLIPSES: Mapping[float, tuple[Dash, float]] = {50.0: ("solid", 1.0), 95.0: ("da
 """Dash and width of an ellipse."""
 FIRST = ("sink_rate_mps", "y_m", "x_m", "bank_deg", "ground_speed_mps")
 """Measures that stand in the first chart of distributions; the others are in a second."""
+NONE_MISSED = "a bar without a point: no flight was beyond it"
+NO_LIMIT_MISSED = " No flight was beyond a limit of the box."
 SHORT = 60.0
 """Of the approach before the threshold this much is drawn with the runway, m."""
 BANDED = "; the tint is the 95 % confidence of the share, and where no flight is left it says what so many still allow"
@@ -57,7 +60,8 @@ def rate_charts(summary: Mapping[str, Any]) -> tuple[Chart, ...]:
     )
     panels = [outcome]
     limits = [one for one in found["limits"] if one["rate"] is not None]
-    if limits:
+    missed = any(one["count"] for one in limits)
+    if missed:
         floor = floor_of(limits)
         labels = tuple(
             f"{one['title']} {'>' if one['side'] == 'above' else '<'} {with_unit(one['limit'], one['unit'])}"
@@ -67,8 +71,8 @@ def rate_charts(summary: Mapping[str, Any]) -> tuple[Chart, ...]:
             Panel(
                 Axis("share of the flights beyond it", "%", log=True, span=(floor, 130.0)),
                 Axis("", ticks=labels),
-                (rates("rate", limits, range(len(limits)), "vermilion", floor),),
-                title="limits of the box that were missed; a bar without a point: no flight was beyond it",
+                _missed(limits, floor),
+                title=f"limits of the box that were missed; {NONE_MISSED}",
                 height=0.16 + 0.12 * len(limits),
             )
         )
@@ -76,7 +80,25 @@ def rate_charts(summary: Mapping[str, Any]) -> tuple[Chart, ...]:
         f"{percent(found['success']['rate'])} of {found['success']['n']} flights landed in the box. The bars are"
         " two-sided Clopper–Pearson intervals with 95 % confidence."
     )
+    if limits and not missed:
+        most = percent(max(one["high"] for one in limits))
+        caption += f"{NO_LIMIT_MISSED} So many flights still allow up to {most} of all to be beyond any one of them."
     return (Chart("rates", "Success, outcomes and missed limits", tuple(panels), 1, caption),)
+
+
+def _missed(limits: Sequence[Mapping[str, Any]], floor: float) -> tuple[Points, ...]:
+    """Those that some flight missed, and paler those that none did, of which there is an upper end alone."""
+    looks: tuple[tuple[bool, str, Tone], ...] = (
+        (True, "missed by some, with its 95 % interval", "vermilion"),
+        (False, "missed by none: what so many flights still allow", "grey"),
+    )
+    found = []
+    for some, name, tone in looks:
+        rows = [row for row, one in enumerate(limits) if bool(one["count"]) is some]
+        if rows:
+            bars = rates(name, [limits[row] for row in rows], rows, tone, floor)
+            found.append(bars if some else replace(bars, mark="none"))
+    return tuple(found)
 
 
 def touchdown_charts(summary: Mapping[str, Any]) -> tuple[Chart, ...]:
@@ -126,14 +148,15 @@ def touchdown_charts(summary: Mapping[str, Any]) -> tuple[Chart, ...]:
         Axis(across, "m", span=y_span),
         (*points, *ellipses),
         seen,
-        title="closer: the touchdowns and the ellipses alone",
+        title="closer: the touchdowns and the ellipses alone" if ellipses else "closer: the touchdowns alone",
         height=1.4,
     )
-    caption = (
-        "Midpoint of the main wheels at first contact. An ellipse holds the next touchdown with its probability, if"
-        f" touchdowns are normally distributed. Drawn: {found['points_rule']}."
-    )
-    return (Chart("touchdown", f"Where {several(found['n'], 'flight')} touched down", (whole, close), 1, caption),)
+    caption = "Midpoint of the main wheels at first contact."
+    if ellipses:
+        caption += " An ellipse holds the next touchdown with its probability, if touchdowns are normally distributed."
+    caption += f" Drawn: {found['points_rule']}."
+    panels = (whole, close) if found["n"] > 1 else (whole,)  # of one there is nothing to see closer
+    return (Chart("touchdown", f"Where {several(found['n'], 'flight')} touched down", panels, 1, caption),)
 
 
 def _points(found: Mapping[str, Any]) -> tuple[Points, ...]:
@@ -195,13 +218,17 @@ def _limits(entry: Mapping[str, Any]) -> list[tuple[float, str]]:
 def _histogram(entry: Mapping[str, Any]) -> Panel:
     edges, counts = entry["histogram"]["edges"], entry["histogram"]["counts"]
     span = (edges[0], edges[-1])
+    shown: Series = Histogram("flights", tuple(edges), tuple(counts), legend=False)
+    if entry["min"] == entry["max"]:  # a bar would be as wide as one likes
+        span, n = (entry["min"], entry["max"]), entry["n"]
+        shown = Points("flights", (entry["min"],), (n,), size=4.5, y_bar=((0,), (n,)), bar_width=1.4, legend=False)
     near, far = limits_near(_limits(entry), span)
     median = next((q["value"] for q in entry["quantiles"] if q["p"] == 0.5), None)
     middle = () if median is None else (Limit("x", median, "median", "ink", "dot"),)
     return Panel(
         Axis(entry["title"], unit_of(entry["unit"])),
         Axis("flights", whole=True),
-        (Histogram("flights", tuple(edges), tuple(counts), legend=False),),
+        (shown,),
         (*middle, *near),
         title=far,
     )

@@ -194,6 +194,8 @@ class Chart:
     columns: int = 1
     caption: str = ""
     """What one has to know to read it."""
+    subtitle: str = ""
+    """Of what: scenario, flights and seeds, for a figure that stands alone."""
 
     @property
     def alternative(self) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
+from landsim.batch.sections.words import flights_for
 from landsim.charts.model import (
     Axis,
     Band,
@@ -13,20 +14,26 @@ from landsim.charts.model import (
     Dash,
     Limit,
     Mark,
+    Mention,
+    Note,
     Numbers,
     Panel,
     Points,
     Series,
     Tone,
 )
-from landsim.charts.shared import PERCENT, QUANTITIES, SOURCES, distance_axis, number, percent, times, unit_of
+from landsim.charts.shared import PERCENT, QUANTITIES, SOURCES, distance_axis, number, percent, there, times, unit_of
 
 TONES: dict[str, Tone] = {"vision": "orange", "fused": "blue"}
-BANDS = (("p50", 0.5), ("p68", 0.35), ("p95", 0.22), ("p99_7", 0.1))
-"""Percentiles, from the inmost, and how strong what lies below each is."""
+PERCENTILES: Mapping[str, tuple[Dash, float, float]] = {
+    "p50": ("dash", 0.8, 0.3),
+    "p95": ("solid", 1.8, 0.1),
+    "p99_7": ("dashdot", 0.8, 0.0),
+}
+"""Dash and width of each, from the inmost, and how strong the tint is from the one before it."""
 SIGMAS = 1.959963984540054
 """So many σ hold 95 % of a normal distribution, either side."""
-LIMITS: tuple[tuple[Tone, Dash], ...] = (("purple", "dash"), ("ink", "dot"), ("ink", "dashdot"), ("grey", "dash"))
+LIMITS: tuple[tuple[Tone, Dash], ...] = (("purple", "dash"), ("purple", "dot"), ("purple", "dashdot"), ("ink", "dash"))
 BOUND: tuple[Tone, Dash] = ("green", "dash")
 DECADES = 4.0
 """What an axis of errors shows at most, below its largest."""
@@ -49,12 +56,19 @@ def envelope_charts(summary: Mapping[str, Any]) -> tuple[Chart, ...]:
     for group, names in GROUPS.items():
         panels = tuple(_envelope(found, source, name) for name in names for source in SOURCES)
         caption = (
-            "Magnitude of the error; each tint holds the stated share of the flights in the air at a distance that have"
-            " an estimate there. Dotted: what the filter itself predicts. The paper's bounds are those that its authors"
-            " state; the published limits are from secondary sources, for comparison."
+            "Magnitude of the error that the stated share of the flights stays below, of those in the air at a distance"
+            f" that have an estimate there. {_takes(found['levels'])} Dotted: what the filter itself predicts."
+            " The paper's bounds are those that its authors state; the published limits are from secondary sources, for"
+            " comparison."
         )
         charts.append(Chart(f"errors-{group}", f"Navigation errors by range: {group}", panels, 2, caption))
     return (*charts, _availability(found))
+
+
+def _takes(levels: Mapping[str, float]) -> str:
+    """From how many flights on there is a percentile."""
+    needs = (f"{levels[key]:g} % takes {flights_for(levels[key])}" for key in ("p95", "p99_7"))
+    return f"A line begins and ends where the flights are enough for it: {', '.join(needs)}."
 
 
 def _of(found: Mapping[str, Any], source: str, quantity: str) -> Mapping[str, Any]:
@@ -66,19 +80,22 @@ def _envelope(found: Mapping[str, Any], source: str, quantity: str) -> Panel:
     of, tone = _of(found, source, quantity), TONES[source]
     span = error_span(found, quantity)
     series: list[Series] = []
-    below: tuple[float | None, ...] = tuple(span[0] for _ in distances)
-    for key, strength in BANDS:
-        here = tuple(of[key])
-        if any(value is not None for value in here):
+    below: Numbers = tuple(span[0] for _ in distances)
+    for key, (dash, width, strength) in PERCENTILES.items():
+        if not there(of[key]):
+            continue
+        level, here = found["levels"][key], _floored(of[key], span[0])
+        if strength:
             low = tuple(span[0] if b is None else min(b, span[1]) for b in below)
-            high = tuple(None if v is None else max(v, span[0]) for v in here)
-            level = found["levels"][key]
-            series.append(Band(f"{level:g} % of the flights", distances, low, high, "grey", strength))
-            below = tuple(b if v is None else v for b, v in zip(below, high, strict=True))
-    for key, width in (("p50", 0.8), ("p95", 1.3)):
-        label = f"{found['levels'][key]:g} %, {source}"
-        series.append(Curve(label, distances, _floored(of[key], span[0]), tone, "solid", width, legend=key == "p95"))
-    if "sigma_rms" in of:
+            band = Band(f"{level:g} % of the flights", distances, low, here, tone, strength, legend=False)
+            series.append(band)
+            below = tuple(b if v is None else v for b, v in zip(below, here, strict=True))
+        series.append(Curve(f"{level:g} %, {source}", distances, here, tone, dash, width))
+    nothing: tuple[Mention, ...] = ()
+    if not there(of["p50"]):
+        few = f"too few flights: 50 % takes {flights_for(found['levels']['p50'])}"
+        nothing = (Note(few if any(of["count"]) else f"no {source} estimate"),)
+    if there(of.get("sigma_rms", ())):
         predicted = _floored(times(of["sigma_rms"], SIGMAS), span[0])
         series.append(Curve("95 % as the filter predicts, 1.96 σ", distances, predicted, "ink", "dot", 1.2))
     series += bounds_of(found, quantity)
@@ -86,7 +103,7 @@ def _envelope(found: Mapping[str, Any], source: str, quantity: str) -> Panel:
     name, unit = QUANTITIES[quantity], unit_of(of["unit"])
     return Panel(
         distance_axis(distances), Axis(f"|{name} error|", unit, log=True, span=span), tuple(series),
-        title=f"{name}: {SOURCES[source]}",
+        nothing, f"{name}: {SOURCES[source]}",
     )  # fmt: skip
 
 
@@ -164,6 +181,7 @@ def _availability(found: Mapping[str, Any]) -> Chart:
     curves = tuple(
         Curve(label, distances, times(_of(found, source, quantity)["share"], PERCENT), tone, dash)
         for source, quantity, label, tone, dash in kinds
+        if any(_of(found, source, quantity)["count"])
     )
     share = Panel(distance_axis(distances), Axis("flights with an estimate", "%", span=(-3.0, 105.0)), curves)
     number_of = Curve("flights in the air", distances, tuple(found["in_the_air"]), "ink", "dot", legend=False)

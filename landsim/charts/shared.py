@@ -4,10 +4,13 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from landsim.batch.sections.words import number, several, unit_of, with_unit
 from landsim.charts.model import Axis, Band, Curve, Dash, Limit, Numbers, Points, Tone
 
-UNITS = {"deg": "°"}
-"""Of a summary, as printed; others are printed as they are."""
+__all__ = [
+    "PERCENT", "QUANTITIES", "SOURCES", "beyond", "counted", "distance_axis", "floor_of", "flown", "limits_near",
+    "number", "percent", "rates", "several", "share_floor", "there", "times", "unit_of", "with_unit", "within",
+]  # fmt: skip
 QUANTITIES = {
     "along_m": "along", "cross_m": "cross", "height_m": "height", "roll_deg": "roll", "pitch_deg": "pitch",
     "yaw_deg": "yaw",
@@ -15,36 +18,6 @@ QUANTITIES = {
 """Of the camera triad, as they are called in a figure."""
 SOURCES = {"vision": "vision, a frame alone", "fused": "fused with the IMU"}
 PERCENT = 100.0
-
-
-def unit_of(name: str) -> str:
-    """A unit as printed."""
-    return UNITS.get(name, name)
-
-
-def number(value: float | None, digits: int = 3) -> str:
-    """A number for a person, with so many significant digits and a minus sign; a dash where there is none."""
-    if value is None:
-        return "–"
-    text = f"{value:.{digits}g}"
-    if "e" in text:
-        mantissa, exponent = text.split("e")
-        raised = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-        text = f"{mantissa}·10{raised}"
-    return text.replace("-", "−")
-
-
-def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
-    """A number and its unit; ``unit`` as in a summary."""
-    printed = unit_of(unit)
-    return number(value, digits) + (
-        "" if value is None or not printed else printed if printed == "°" else f" {printed}"
-    )
-
-
-def several(count: int, of: str) -> str:
-    """A number of things, with its plural."""
-    return f"{count:,} {of}{'' if count == 1 else 's'}"
 
 
 def percent(share: float | None) -> str:
@@ -62,9 +35,22 @@ def counted(entry: Mapping[str, Any]) -> str:
     )
 
 
+def flown(scenario: Any, n: int, seeds: Sequence[int] | None) -> str:
+    """Which flights a figure is of: scenario, how many, and the seeds that fly them again."""
+    if not seeds:
+        return f"{scenario}: {several(n, 'flight')}"
+    first, last = seeds
+    return f"{scenario}: {several(n, 'flight')}, seed{f' {first}' if first == last else f's {first} to {last}'}"
+
+
 def times(values: Iterable[float | None], factor: float) -> Numbers:
     """Numbers in another unit."""
     return tuple(None if value is None else factor * value for value in values)
+
+
+def there(numbers: Sequence[float | None]) -> bool:
+    """Whether there is a number to draw: a curve of none would be named in a legend and seen nowhere."""
+    return any(value is not None for value in numbers)
 
 
 def rates(

@@ -5,12 +5,13 @@ Plotly reads texts as a small HTML of its own; whatever comes from a name or a f
 
 import math
 from html import escape
-from typing import Any
+from typing import Any, NamedTuple
 
-from landsim.charts.extent import extent, names_above
+from landsim.charts.extent import Name, extent, names_above
 from landsim.charts.model import (
     COLOURS,
     Axis,
+    Chart,
     Limit,
     Note,
     Panel,
@@ -36,19 +37,60 @@ TICKS = {1: 8, 2: 6, 3: 4}
 """Most numbers along a panel, by how many panels stand side by side."""
 HEIGHT = 300
 """Of an ordinary panel, px."""
+FEW_DECADES, MANY_DECADES = 1.3, 5.0
+"""A logarithmic axis of fewer has numbers at 2 and 5 too, one of more no marks between the powers of ten."""
 CONFIG: dict[str, Any] = {
     "displaylogo": False,
     "responsive": True,
     "showSendToCloud": False,
     "showLink": False,
     "plotlyServerURL": "",
-    "modeBarButtons": [["toImage"], ["zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "resetScale2d"]],
+    "modeBarButtons": [["toImage"], ["zoom2d", "pan2d", "resetScale2d"]],
     "displayModeBar": "hover",
 }
-"""Of every figure.  Plotly's own buttons would offer to send its numbers to a server: these are all that there are."""
+"""Of every figure.  Plotly's own buttons would offer to send its numbers to a server: these are all that there are, and
+few enough to stand beside the title of a narrow panel."""
 
 
-def panel_figure(panel: Panel, columns: int = 1) -> dict[str, Any]:
+class Frame(NamedTuple):
+    """What is around a panel, px: panels that stand side by side, or one above the other, share it."""
+
+    left: int
+    top: int
+    foot: int
+    height: int
+    """Of the panel itself."""
+
+
+def chart_figures(chart: Chart) -> list[dict[str, Any]]:
+    """The panels of a chart as `panel_figure` has them, in line with each other.
+
+    Panels of a row have their axes at one height and are as high as the highest; all of a chart begin at one distance
+    from the left.
+    """
+    frames = [_frame(panel) for panel in chart.panels]
+    left = max(frame.left for frame in frames)
+    figures = []
+    for first in range(0, len(frames), chart.columns):
+        row = frames[first : first + chart.columns]
+        frame = Frame(left, *(max(one[i] for one in row) for i in (1, 2, 3)))
+        figures += [panel_figure(panel, chart.columns, frame) for panel in chart.panels[first : first + chart.columns]]
+    return figures
+
+
+def _frame(panel: Panel) -> Frame:
+    """The room that a panel needs by itself."""
+    levels = 1 + max((name.level for name in _names(panel)), default=-1)
+    slanted = max((len(name) for name in panel.x.ticks), default=0)
+    foot = max(46, round(LETTER * SIZE * slanted * math.sin(math.radians(SLANT))) + 16)
+    return Frame(_left(panel), 8 + ROW * levels, foot, round(HEIGHT * panel.height))
+
+
+def _names(panel: Panel) -> list[Name]:
+    return names_above(panel, NARROW, LETTER * SMALL)
+
+
+def panel_figure(panel: Panel, columns: int = 1, frame: Frame | None = None) -> dict[str, Any]:
     """Data and layout of a panel, as plotly.js takes them and JSON holds them.
 
     Parameters
@@ -56,6 +98,8 @@ def panel_figure(panel: Panel, columns: int = 1) -> dict[str, Any]:
     panel : Panel
     columns : int
         How many panels stand side by side.
+    frame : Frame, optional
+        What is around it; what it needs by itself if not given.
 
     Returns
     -------
@@ -63,21 +107,17 @@ def panel_figure(panel: Panel, columns: int = 1) -> dict[str, Any]:
         ``data``, a list, and ``layout``.
     """
     data = [trace for series in panel.series for trace in traces_of(series, panel)]
-    names = names_above(panel, NARROW, LETTER * SMALL)
-    levels = 1 + max((name.level for name in names), default=-1)
-    top = 8 + ROW * levels
-    height = round(HEIGHT * panel.height)
-    slanted = max((len(name) for name in panel.x.ticks), default=0)
-    foot = max(46, round(LETTER * SIZE * slanted * math.sin(math.radians(SLANT))) + 16)
+    frame = frame or _frame(panel)
     layout = {
         "autosize": True,
-        "height": height + top + foot,
-        "margin": {"l": _left(panel), "r": 12, "t": top, "b": foot},
+        "height": frame.height + frame.top + frame.foot,
+        "margin": {"l": frame.left, "r": 12, "t": frame.top, "b": frame.foot},
         "font": {"family": FONT, "size": SIZE, "color": COLOURS["ink"]},
         "paper_bgcolor": "#ffffff",
         "plot_bgcolor": "#ffffff",
         "hovermode": "closest",
         "hoverlabel": {"align": "left", "bgcolor": "#ffffff", "bordercolor": "#555555", "font": {"color": "#000000"}},
+        "modebar": {"bgcolor": "#ffffff", "color": "#555555", "activecolor": "#005a8f"},
         "showlegend": False,
         "dragmode": "zoom",
         "xaxis": _axis(panel.x, extent(panel, "x"), "x", TICKS[columns]),
@@ -85,7 +125,8 @@ def panel_figure(panel: Panel, columns: int = 1) -> dict[str, Any]:
         "shapes": [shape for mention in panel.mentions for shape in _shapes(mention)],
         "annotations": [
             *({**_words(name.limit.label, name.limit.tone), "x": _placed(panel.x, name.limit.at), "xanchor": name.align,
-               "y": 1.0, "yref": "y domain", "yanchor": "bottom", "yshift": ROW * name.level} for name in names),
+               "y": 1.0, "yref": "y domain", "yanchor": "bottom", "yshift": ROW * name.level}
+              for name in _names(panel)),
             *(annotation for mention in panel.mentions for annotation in _annotations(mention)),
         ],
     }  # fmt: skip
@@ -116,8 +157,11 @@ def _axis(axis: Axis, ends: tuple[float, float], along: str, ticks: int) -> dict
             "ticktext": [_tick(name, along) for name in axis.ticks],
         }
         look |= {"tickangle": -SLANT} if along == "x" else {}
-    elif axis.log and (along == "x" or abs(last - first) < 1.5):
-        look |= {"dtick": 1 if abs(last - first) > 2.2 else "D2"}
+    elif axis.log:
+        # by itself Plotly writes every digit between the powers of ten, one over the other; page.js does as here
+        # where one zooms
+        look |= {"dtick": 1 if abs(last - first) > FEW_DECADES else "D2"}
+        look |= {"minor": {"ticks": "outside", "ticklen": 2, "dtick": "D1"}} if abs(last - first) < MANY_DECADES else {}
     elif axis.whole:
         look |= {"dtick": _whole_step(abs(last - first) / 6.0), "tick0": 0}
     elif along == "x":
@@ -210,5 +254,5 @@ def _annotations(mention: Limit | Region | Note) -> list[dict[str, Any]]:
 def _words(text: str, tone: Tone) -> dict[str, Any]:
     return {
         "text": escape(text, quote=False), "showarrow": False, "font": {"size": SMALL, "color": COLOURS[tone]},
-        "borderpad": 1,
+        "borderpad": 1, "bgcolor": "rgba(255,255,255,0.8)",
     }  # fmt: skip

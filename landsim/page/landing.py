@@ -24,7 +24,6 @@ def outcomes_blocks(summary: Mapping[str, Any], charts: Charts) -> tuple[Block, 
             one["title"],
             f"{'at most' if one['side'] == 'above' else 'at least'} {with_unit(one['limit'], one['unit'])}",
             *rate_row("", one)[1:],
-            one["of"],
         )
         for one in rates["limits"]
     )
@@ -36,10 +35,10 @@ def outcomes_blocks(summary: Mapping[str, Any], charts: Charts) -> tuple[Block, 
             ended,
         ),
         Table(
-            "How many flights missed each limit of the scenario's box",
-            ("limit on", "limit", "missed", "of", "rate", percentage, "among"),
+            "How many flights missed each limit of the scenario's box, of those that touched down or stopped",
+            ("limit on", "limit", "missed", "of", "rate", percentage),
             limits,
-            words=frozenset({1, 6}),
+            words=frozenset({1}),
         ),
     )
 

@@ -3,9 +3,13 @@
 from collections.abc import Mapping
 from typing import Any
 
-from landsim.charts.shared import QUANTITIES, number, with_unit
+from landsim.batch.sections.words import flights_for
+from landsim.charts.shared import QUANTITIES, SOURCES, number, with_unit
 from landsim.page.document import Block, Charts, Table, Text, figures_of
 from landsim.page.sentences import DASH
+
+NOT_JUDGED = {"too few": "too few flights", "none": "no estimate"}
+"""States of a limit that nothing can be said of."""
 
 
 def navigation_blocks(summary: Mapping[str, Any], charts: Charts) -> tuple[Block, ...]:
@@ -15,20 +19,8 @@ def navigation_blocks(summary: Mapping[str, Any], charts: Charts) -> tuple[Block
         *figures_of(charts["navigation"], "No flight was in the air at any of the distances."),
         Text(tuple(found["text"])),
     ]
-    if found["bounds"] and any(found["in_the_air"]):
-        rows = tuple(
-            (
-                f"{QUANTITIES[one['quantity']]}, {one['stage']} stage",
-                with_unit(one["value"], one["quantity"].rsplit("_", 1)[1]),
-                f"{number(one['from_m'], 4)} to {number(one['to_m'], 4)} m",
-                *(_from(one["p95_within_from_m"][source], one) for source in ("vision", "fused")),
-            )
-            for one in found["bounds"]
-        )
-        head = ("bound of the paper", "stays within", "stated from", "vision, 95 %, from", "fused, 95 %, from")
-        blocks.append(
-            Table("From which distance on 95 % of the flights keep to the paper's bounds", head, rows, frozenset({2}))
-        )
+    if any(found["in_the_air"]):
+        blocks.append(_limits(found))
     names: dict[str, list[str]] = {}
     for one in (*found["bounds"], *found["limits"]):
         name = one.get("name", "bounds of the paper")
@@ -39,10 +31,45 @@ def navigation_blocks(summary: Mapping[str, Any], charts: Charts) -> tuple[Block
     return tuple(blocks)
 
 
-def _from(value: float | None, bound: Mapping[str, Any]) -> str:
-    if value is None:
-        return "not to the end"
-    return "throughout" if value >= bound["from_m"] else f"{number(value, 4)} m on"
+def _limits(found: Mapping[str, Any]) -> Table:
+    """Whether 95 % of the flights keep to the paper's bounds and to the published limits, and how far that is known."""
+    rows = [
+        (
+            f"{QUANTITIES[one['quantity']]}, {one['stage']} stage",
+            "the paper",
+            with_unit(one["value"], one["quantity"].rsplit("_", 1)[1]),
+            f"{number(one['from_m'], 4)} to {number(one['to_m'], 4)} m",
+            *(_judged(one["p95"][source]) for source in SOURCES),
+        )
+        for one in found["bounds"]
+    ]
+    rows += [
+        (
+            QUANTITIES[one["quantity"]],
+            one["name"],
+            " to ".join(dict.fromkeys((number(one["value"][0]), number(one["value"][-1])))) + " m",
+            f"{number(one['distance_m'][0], 4)} to {number(one['distance_m'][-1], 4)} m",
+            *(_judged(one["p95"][source]) for source in SOURCES),
+        )
+        for one in found["limits"]
+    ]
+    head = ("error of", "limit by", "limit", "stated from", *(f"{source}, 95 % of the flights" for source in SOURCES))
+    caption = (
+        "Whether 95 % of the flights keep to the paper's bounds and to published limits; in brackets the distances at"
+        f" which {flights_for(found['levels']['p95'])} flights have an estimate"
+    )
+    return Table(caption, head, tuple(rows), words=frozenset({1, 2, 3, 4, 5}))
+
+
+def _judged(one: Mapping[str, Any]) -> str:
+    """Kept, broken or not known, and from where to where that was looked at."""
+    if one["state"] in NOT_JUDGED:
+        return NOT_JUDGED[one["state"]]
+    seen = f"({number(one['first_m'], 4)} to {number(one['last_m'], 4)} m)"
+    if one["state"] == "kept":
+        return f"kept {seen}"
+    rest = "" if one["within_from_m"] is None else f", kept from {number(one['within_from_m'], 4)} m on"
+    return f"broken{rest} {seen}"
 
 
 def consistency_blocks(summary: Mapping[str, Any], charts: Charts) -> tuple[Block, ...]:

@@ -6,7 +6,7 @@ from typing import Any
 
 from landsim.charts.model import Chart
 from landsim.page.document import Code, Document, Figure, Table, Text
-from landsim.page.figure import CONFIG, panel_figure
+from landsim.page.figure import CONFIG, chart_figures
 from landsim.page.legend import HEIGHT, WIDTH, legend_of
 
 KINDS = {Text: "text", Table: "table", Figure: "figure", Code: "code"}
@@ -43,7 +43,7 @@ def render(document: Document, version: str) -> str:
 
 
 def _figure(chart: Chart) -> dict[str, Any]:
-    return {"name": chart.name, "panels": [panel_figure(panel, chart.columns) for panel in chart.panels]}
+    return {"name": chart.name, "panels": chart_figures(chart)}
 
 
 def _for_script(value: Any) -> str:

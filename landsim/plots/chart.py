@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from textwrap import wrap
 
 from matplotlib import rc_context
 from matplotlib.artist import Artist
@@ -27,11 +28,15 @@ PANEL = {1: 5.2 * CM, 2: 4.2 * CM, 3: 3.6 * CM}
 """Height of an ordinary panel, by how many stand side by side, inches."""
 LEFT, RIGHT, GAP, BETWEEN, FOOT = 0.58, 0.14, 0.64, 0.42, 0.42
 """Margins, what is between columns and between rows beside the names of limits, and the foot, inches."""
+TICKS = {1: 10, 2: 7, 3: 3}
+"""Most numbers along a panel, by how many stand side by side."""
 SHEET = 25.5 * CM
 """No figure is higher: panels of many rows are less high, inches."""
-TITLE_ROW, LEGEND_ROW, HEAD = 0.2, 0.145, 0.08
+TITLE_ROW, SUBTITLE_ROW, LEGEND_ROW, HEAD = 0.2, 0.135, 0.145, 0.08
 SLANT = 50.0
 """Of the names along a list that lies, degrees."""
+SOFT = "#404040"
+"""Of the subtitle."""
 LETTER = 0.53
 """Width of a letter, as a share of its size."""
 
@@ -70,7 +75,9 @@ def chart_figure(chart: Chart) -> Figure:
     figure = Figure(figsize=(PAGE, 1.0))
     legend = _legend(chart)
     lines = _broken(list(legend), PAGE)
-    head = HEAD + TITLE_ROW + LEGEND_ROW * len(lines) + 0.06
+    subtitle = wrap(chart.subtitle, int(72.0 * 0.97 * PAGE / (LETTER * 7.0)))
+    above = HEAD + TITLE_ROW + SUBTITLE_ROW * len(subtitle) + (0.04 if subtitle else 0.0)
+    head = above + LEGEND_ROW * len(lines) + 0.06
     names = [max(_room_below(panel) for panel in row) for row in rows]
     around = head + sum(heads) + sum(names) + BETWEEN * (len(rows) - 1) + FOOT
     fitting = min(1.0, max(SHEET - around, 1.0) / sum(heights))
@@ -78,18 +85,22 @@ def chart_figure(chart: Chart) -> Figure:
     total = around + sum(heights)
     figure.set_size_inches(PAGE, total)
     top = total - head
-    for row, height, above, below in zip(rows, heights, heads, names, strict=True):
-        top -= above + height
+    for row, height, over, below in zip(rows, heights, heads, names, strict=True):
+        top -= over + height
         for k, panel in enumerate(row):
             place = ((left + k * across) / PAGE, top / total, width / PAGE, height / total)
             axes = figure.add_axes(place)
-            _panel(axes, panel, width)
+            _panel(axes, panel, width, columns)
         top -= BETWEEN + below
     figure.text(0.012, 1.0 - HEAD / total, chart.title, va="top", fontsize=_fitting(chart.title, 8.5))
+    for i, text in enumerate(subtitle):
+        figure.text(
+            0.012, 1.0 - (HEAD + TITLE_ROW + SUBTITLE_ROW * i) / total, text, va="top", fontsize=7.0, color=SOFT
+        )
     for i, line in enumerate(lines):
         figure.legend(
             [legend[name] for name in line], line, loc="upper left", ncols=len(line), columnspacing=1.4,
-            bbox_to_anchor=(0.008, 1.0 - (HEAD + TITLE_ROW + LEGEND_ROW * i) / total),
+            bbox_to_anchor=(0.008, 1.0 - (above + LEGEND_ROW * i) / total),
         )  # fmt: skip
     return figure
 
@@ -142,9 +153,9 @@ def _legend(chart: Chart) -> dict[str, Artist]:
     return handles if len(handles) > 1 else {}
 
 
-def _panel(axes: Axes, panel: Panel, width: float) -> None:
-    _axis(axes, "x", panel.x)
-    _axis(axes, "y", panel.y)
+def _panel(axes: Axes, panel: Panel, width: float, columns: int) -> None:
+    _axis(axes, "x", panel.x, TICKS[columns])
+    _axis(axes, "y", panel.y, 6)
     axes.set_xlim(*extent(panel, "x"))
     axes.set_ylim(*extent(panel, "y"))
     axes.set_xlabel(panel.x.label)
@@ -172,7 +183,7 @@ def _panel(axes: Axes, panel: Panel, width: float) -> None:
         axes.set_title(panel.title, loc="left", pad=3.0 + LEVEL_PT * levels)
 
 
-def _axis(axes: Axes, along: Along, axis: Axis) -> None:
+def _axis(axes: Axes, along: Along, axis: Axis, ticks: int) -> None:
     """Scale and ticks; a list has its names instead of numbers."""
     one = axes.xaxis if along == "x" else axes.yaxis
     (axes.set_xscale if along == "x" else axes.set_yscale)("log" if axis.log else "linear")
@@ -191,7 +202,7 @@ def _axis(axes: Axes, along: Along, axis: Axis) -> None:
             one.set_major_locator(LogLocator(numticks=20))
             one.set_minor_locator(LogLocator(subs=(2.0, 5.0), numticks=40))
             one.set_minor_formatter(NullFormatter())
-        elif axis.whole:
-            one.set_major_locator(MaxNLocator(nbins=6, integer=True))
+        else:
+            one.set_major_locator(MaxNLocator(nbins=ticks, integer=axis.whole, steps=(1, 2, 2.5, 5, 10)))
         one.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
         axes.grid(visible=True, axis=along)

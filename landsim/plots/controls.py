@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
-from landsim.metrics import Log
+from landsim.metrics import Array, Log
 from landsim.plots.style import (
     BLACK,
     BLUE,
@@ -22,6 +22,7 @@ from landsim.plots.style import (
     TRUE,
     VERMILION,
     failure,
+    foot_of_head,
     legend_above,
     legend_in_head,
     new_figure,
@@ -41,6 +42,8 @@ PHASE_SHADES = {
     Phase.ROLLOUT: "#f7ead2",
     Phase.STOPPED: "#e3d2ae",
 }
+HEAD, ROW, FOOT = 1.13, 1.64, 0.49
+"""Of the figure: its head, a row of panels with what is between them, what is below; inches."""
 CRASH: dict[str, Any] = {"color": VERMILION, "lw": 1.0, "ls": "-."}
 
 
@@ -48,10 +51,9 @@ CRASH: dict[str, Any] = {"color": VERMILION, "lw": 1.0, "ls": "-."}
 def controls_and_attitude(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -> Figure:
     """What was commanded, what came of it, and what the controls did, over time.
 
+    What is zero throughout, such as the weight on the wheels of a flight that never came down, is named and not drawn.
     The airspeed command is shown in the approach: from the flare on the throttle is at idle and nothing follows it.
     """
-    figure = new_figure((10.0, 9.8), "attitude and controls", metrics)
-    grid = figure.add_gridspec(5, 2, left=0.09, right=0.985, top=0.885, bottom=0.05, hspace=0.36, wspace=0.26)
     failed = failure(log, scenario, metrics)
     log = until_shortly_after(log, failed)
     few = thinned(log)
@@ -75,8 +77,16 @@ def controls_and_attitude(log: Log, scenario: "Scenario", metrics: dict[str, Any
         ("camera tilt, ° down", [("tilt_deg", TRUE)]),
         ("weight on wheel (1)", _lines("wow_nose", "wow_left", "wow_right")),
     ]
+    idle = [label for label, curves in rows if not any(_moves(few[name]) for name, _ in curves)]
+    rows = [row for row in rows if row[0] not in idle]
+    lines = max(-(-len(rows) // 2), 1)
+    height = HEAD + ROW * lines + FOOT
+    figure = new_figure((10.0, height), "attitude and controls", metrics)
+    grid = figure.add_gridspec(
+        lines, 2, left=0.09, right=0.985, top=1.0 - HEAD / height, bottom=FOOT / height, hspace=0.36, wspace=0.26
+    )
     for i, (label, curves) in enumerate(rows):
-        axes = figure.add_subplot(grid[i % 5, i // 5])
+        axes = figure.add_subplot(grid[i % lines, i // lines])
         for name, style in curves:
             axes.plot(few["time_s"], few[name], **style)
         axes.set_ylabel(label)
@@ -87,7 +97,7 @@ def controls_and_attitude(log: Log, scenario: "Scenario", metrics: dict[str, Any
             axes.axvline(log["time_s"][failed.row], **CRASH)
         axes.yaxis.set_label_coords(-0.125, 0.5)
         legend_above(axes)
-        if i % 5 == 4:
+        if i % lines == lines - 1 or i == len(rows) - 1:
             axes.set_xlabel("time, s")
     handles: list[Any] = [Rectangle((0, 0), 1, 1, fc=shade, ec=GREY, lw=0.6) for shade in PHASE_SHADES.values()]
     names = [f"{'by guidance: ' if phase is Phase.ACQUIRE else ''}{phase.name.lower()}" for phase in PHASE_SHADES]
@@ -95,7 +105,16 @@ def controls_and_attitude(log: Log, scenario: "Scenario", metrics: dict[str, Any
         handles.append(Line2D([], [], **CRASH))
         names.append(failed.name)
     legend_in_head(figure, handles, names)
+    if idle:
+        foot_of_head(
+            figure, f"zero throughout: {', '.join(label.partition(',')[0].removesuffix(' (1)') for label in idle)}"
+        )
     return figure
+
+
+def _moves(values: Array) -> bool:
+    """Whether there is anything else than zero to see."""
+    return bool(np.any(np.isfinite(values) & (values != 0.0)))
 
 
 def _lines(*names: str) -> list[tuple[str, dict[str, Any]]]:

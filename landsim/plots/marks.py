@@ -39,6 +39,8 @@ MARKS: dict[Mark, dict[str, Any]] = {
     "triangle": {"marker": "^", "mew": 0.8, "mfc": "none"},
     "none": {"marker": ""},
 }
+CLEAR: dict[str, Any] = {"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.6}
+"""Behind a name within a panel: no line runs through it."""
 DRAWN: dict[Step, Any] = {"": "default", "before": "steps-pre", "after": "steps-post"}
 FILLED: dict[Step, Any] = {"": None, "before": "pre", "after": "post"}
 
@@ -109,6 +111,7 @@ def draw_limit(axes: Axes, limit: Limit) -> None:
     axes.annotate(
         limit.label, (1.0, limit.at), xycoords=axes.get_yaxis_transform(), xytext=(-2.0, 1.5),
         textcoords="offset points", ha="right", va="bottom", fontsize=7.0, color=COLOURS[limit.tone], zorder=4.0,
+        bbox=CLEAR,
     )  # fmt: skip
 
 
@@ -125,7 +128,7 @@ def draw_region(axes: Axes, panel: Panel, region: Region) -> None:
     if region.label:
         axes.annotate(
             region.label, (x0, y1), xytext=(0.0, 2.0), textcoords="offset points", ha="left", va="bottom", fontsize=7.0,
-            color=colour, zorder=4.0,
+            color=colour, zorder=4.0, bbox=CLEAR,
         )  # fmt: skip
 
 

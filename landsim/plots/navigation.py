@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
 from scipy.special import chdtri
 
 from landsim.log import QUANTITIES
@@ -40,6 +40,9 @@ from landsim.plots.style import (
 if TYPE_CHECKING:
     from landsim.config import Scenario
 
+NO_COVARIANCE = "no covariance given"
+"""What there is to say of an estimator that does not tell how sure it is."""
+
 
 @rc_context(STYLE)
 def navigation_errors(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -> Figure:
@@ -52,18 +55,20 @@ def navigation_errors(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -
     grid = figure.add_gridspec(3, 2, left=0.1, right=0.985, top=0.818, bottom=0.055, hspace=0.34, wspace=0.3)
     failed = failure(log, scenario, metrics)
     log = until_shortly_after(log, failed)
-    few, frames = thinned(log), np.isfinite(log["nees9"])
+    few, frames = thinned(log), np.isfinite(log["accepted"])
     marks = event_times(log, metrics, failed)
     unstarted = usable_frames(log)
+    uncertain = gives_covariance(log)
     for i, quantity in enumerate(QUANTITIES):
         axes = figure.add_subplot(grid[i % 3, i // 3])
         name, unit = quantity.rsplit("_", 1)
         sigma = few[f"sigma_{quantity}"]
         vision, fused = error(log, "vision", quantity), error(log, "fused", quantity)[frames]
         axes.plot(log["time_s"], vision, **VISION)
-        axes.fill_between(
-            few["time_s"], -3.0 * sigma, 3.0 * sigma, color=SKY, alpha=0.35, lw=0.0, label="± 3 σ of the filter"
-        )
+        if uncertain:
+            axes.fill_between(
+                few["time_s"], -3.0 * sigma, 3.0 * sigma, color=SKY, alpha=0.35, lw=0.0, label="± 3 σ of the filter"
+            )
         axes.plot(log["time_s"][frames], fused, color=BLUE, lw=0.5, label="fused, at camera frames", zorder=2.5)
         nothing = "no estimate" if unstarted is None else never_started(unstarted)
         _root_scale(axes, nothing, vision, fused, 3.0 * sigma)
@@ -78,7 +83,11 @@ def navigation_errors(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -
         if i == 0:
             legend_in_head(figure, *axes.get_legend_handles_labels())
     words = "the times below and the distances above hold for the whole column"
-    foot_of_head(figure, words if unstarted is None else f"{words}\n{never_started(unstarted)}")
+    if unstarted is not None:
+        words += f"\n{never_started(unstarted)}"
+    elif not uncertain:
+        words += f"\n{NO_COVARIANCE}: no ± 3 σ"
+    foot_of_head(figure, words)
     return figure
 
 
@@ -94,11 +103,13 @@ def _root_scale(axes: Axes, nothing: str, *values: Array) -> None:
         axes.set_yticks([])
         return
     axes.set_yscale("function", functions=(signed_root, signed_square))
-    ticks = [round_below(top)]
-    for _ in range(2):
-        ticks.append(round_below(ticks[-1] / 3.9))
-    axes.yaxis.set_major_locator(FixedLocator([-tick for tick in ticks] + [0.0] + ticks))
+    most = round_below(top)
+    fourths = 0.25 * most * np.arange(1.0, math.floor(4.0 * top / most) + 1.0)
+    # on an axis of square roots these five are evenly spaced; the marks between them are so on a plain one
+    axes.yaxis.set_major_locator(FixedLocator([-most, -0.25 * most, 0.0, 0.25 * most, most]))
+    axes.yaxis.set_minor_locator(FixedLocator([*-fourths, *fourths]))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
+    axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set_ylim(-top, top)
 
 
@@ -113,9 +124,14 @@ def signed_square(values: Array) -> Array:
 
 
 def round_below(value: float) -> float:
-    """The next lower 1, 2 or 5 times a power of ten."""
+    """The next lower 0.8, 2 or 4 times a power of ten: round, and so is a quarter of it."""
     power = 10.0 ** math.floor(math.log10(value))
-    return power * max(m for m in (1.0, 2.0, 5.0) if m * power <= value * (1.0 + 1e-9))
+    return power * max(m for m in (0.8, 2.0, 4.0, 8.0) if m * power <= value * (1.0 + 1e-9))
+
+
+def gives_covariance(log: Log) -> bool:
+    """Whether the estimator says how sure it is; a plug-in need not."""
+    return bool(np.isfinite(log["sigma_cross_m"]).any())
 
 
 @rc_context(STYLE)
@@ -144,6 +160,8 @@ def consistency(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -> Figu
     )
     marks = event_times(log, metrics, failed)
     unstarted = usable_frames(log)
+    nothing = "no frame" if gives_covariance(log) else f"{NO_COVARIANCE}: nothing to normalise by"
+    nothing = nothing if unstarted is None else never_started(unstarted)
     handles: dict[str, Any] = {}
     for i, (name, label, dof, gate) in enumerate(panels):
         axes = figure.add_subplot(grid[i])
@@ -167,15 +185,14 @@ def consistency(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -> Figu
         levels = mark(axes, marks)
         if i == 0:
             distance_axis(axes, log, levels)
+        if not rows.size:
+            note(axes, nothing)
+            axes.set_yticks([])
+            continue
         for handle, of in zip(*axes.get_legend_handles_labels(), strict=True):
             handles.setdefault(of, handle)
-        if not rows.size:
-            note(axes, "no frame" if unstarted is None else never_started(unstarted))
-            axes.set_yticks([])
-        else:
-            axes.set_ylim(
-                0.4 * chdtri(float(n.min()), 0.975), 1.6 * max(largest(values), chdtri(float(n.max()), 0.025))
-            )
+        axes.set_ylim(0.4 * chdtri(float(n.min()), 0.975), 1.6 * max(largest(values), chdtri(float(n.max()), 0.025)))
     axes.set_xlabel("time, s")
-    legend_in_head(figure, list(handles.values()), list(handles))
+    if handles:
+        legend_in_head(figure, list(handles.values()), list(handles))
     return figure

@@ -45,6 +45,7 @@ STYLE: Any = {
     "xtick.labelsize": 8.5,
     "ytick.labelsize": 8.5,
     "axes.xmargin": 0.0,
+    "text.parse_math": False,  # a dollar sign in a name is a dollar sign
 }
 POINTS = 1500
 """A line in a picture needs no more."""

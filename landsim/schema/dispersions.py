@@ -21,7 +21,10 @@ OPTIONAL = {("truncated-normal", "low"), ("truncated-normal", "high"), ("discret
 """Those that may be left out; of a truncated normal one of both."""
 
 MOST_SIGMAS = 6.0
-"""By which the mean of a truncated normal distribution may lie outside its ends."""
+"""By which the mean of a truncated normal distribution may lie outside its ends; and as far to either side all that a
+distribution without ends draws must be allowed.  One number in a billion lies farther out, of a batch of ten million
+flights that of every hundredth batch: such a draw is refused before the batch flies.
+"""
 
 
 class DrawConfig(Section):
@@ -34,13 +37,14 @@ class DrawConfig(Section):
     """What the drawn number does to the scenario's: it takes its place, is added to it or multiplies it."""
     mean: Number | None = None
     sigma: Positive | None = None
-    """Of a normal distribution; of a truncated one, those that it has before it is cut off."""
+    """Of a normal distribution; of a truncated one, those that it has before it is cut off.  Where there is no end,
+    every value up to six sigma must be one that the key may have."""
     low: Number | None = None
     high: Number | None = None
     """Ends of a uniform distribution, or where a normal one is cut off."""
     median: Positive | None = None
     sigma_log: Annotated[float, Field(gt=0.0, le=10.0)] | None = None
-    """Of the natural logarithm: 0.1 is about 10 %."""
+    """Of the natural logarithm: 0.1 is about 10 %.  Six of them to either side must be allowed."""
     values: Annotated[tuple[Number, ...] | None, BeforeValidator(tuple_from_list)] = None
     weights: Annotated[tuple[Positive, ...] | None, BeforeValidator(tuple_from_list)] = None
     """In any scale; without them, every value is as likely as another."""

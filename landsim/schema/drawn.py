@@ -1,5 +1,6 @@
 """Which keys of a scenario may be drawn, and whether what is drawn for them is allowed."""
 
+import math
 from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any, TypeVar, get_args
@@ -8,7 +9,7 @@ from pydantic import ValidationError
 
 from landsim.errors import did_you_mean, what_is_wrong
 from landsim.schema.base import Section, fields_by_key, refused, section_of
-from landsim.schema.dispersions import DrawConfig
+from landsim.schema.dispersions import MOST_SIGMAS, DrawConfig
 
 NEVER = {
     "kind": "says what the file is",
@@ -148,12 +149,50 @@ def check_draw(file: Section, draw: DrawConfig, place: str, drawn: set[str]) -> 
     if draw.apply == "multiply" and own == 0.0:
         raise refused(f'{draw.key} is 0 and stays 0 whatever multiplies it; use "add" or "replace"', f"{place}.apply")
     for name, number in _points(draw):
+        why = _refused_at(file, draw, applied(draw, own, number))
+        if why is not None:
+            raise refused(f"{number:g} is drawn, but {why}", f"{place}.{name}")
+    for name, end, away, number in _tails(draw):
         value = applied(draw, own, number)
-        wrong = refusal(file, {draw.key: value})
-        if wrong is not None:
-            key, what = wrong
-            with_it = "" if key == draw.key else f"with {draw.key} = {value:g}, "
-            raise refused(f"{number:g} is drawn, but {with_it}{key} {what}", f"{place}.{name}")
+        why = _refused_at(file, draw, value)
+        if why is not None:
+            drawn_too = f"{draw.distribution} draws {value:.4g} too, {away:.3g} sigma out, but {why}"
+            advice = f'use "truncated-normal" with {end}, or a smaller {name}'
+            raise refused(f"{drawn_too}; {advice}", f"{place}.{name}")
+
+
+def without_value(what: str) -> str:
+    """What is wrong with a value, where the value has been said already."""
+    return what.rpartition(", not ")[0] or what
+
+
+def _refused_at(file: Section, draw: DrawConfig, value: float) -> str | None:
+    """Why a scenario cannot have a value that is drawn; None if it can."""
+    wrong = refusal(file, {draw.key: value})
+    if wrong is None:
+        return None
+    key, what = wrong
+    if key != draw.key:
+        return f"with {draw.key} = {value:g}, {key} {what}"
+    return f"{key} {without_value(what) if draw.apply == 'replace' else what}"
+
+
+def _tails(draw: DrawConfig) -> Iterator[tuple[str, str, float, float]]:
+    """The parameter, the end that is open, and so far out there that next to none lies beyond: in sigmas, and a number.
+
+    Beyond a cut at a sigma, of the normal distribution that is left as much lies past sqrt(a² + 6²) as of a whole one
+    past 6.
+    """
+    if draw.median is not None and draw.sigma_log is not None:
+        for end, sign in (("low", -1.0), ("high", 1.0)):
+            yield "sigma_log", end, MOST_SIGMAS, draw.median * math.exp(sign * MOST_SIGMAS * draw.sigma_log)
+    if draw.mean is None or draw.sigma is None:
+        return
+    for end, other, sign in (("low", draw.high, -1.0), ("high", draw.low, 1.0)):
+        if getattr(draw, end) is None:
+            cut = 0.0 if other is None else max(sign * (other - draw.mean) / draw.sigma, 0.0)
+            away = math.hypot(cut, MOST_SIGMAS)
+            yield "sigma", end, away, draw.mean + sign * away * draw.sigma
 
 
 def _check_key(model: type[Section], key: str, place: str) -> None:
@@ -175,7 +214,10 @@ def _check_key(model: type[Section], key: str, place: str) -> None:
 
 
 def _points(draw: DrawConfig) -> list[tuple[str, float]]:
-    """Numbers that must be allowed, by the parameter that gives them: the ends, or what half of all go beyond."""
+    """Numbers that must be allowed, by the parameter that gives them: the ends, or what half of all go beyond.
+
+    Those of the open ends are `_tails`.
+    """
     if draw.values is not None:
         return [(f"values[{i}]", value) for i, value in enumerate(draw.values)]
     ends = [(name, end) for name, end in (("low", draw.low), ("high", draw.high)) if end is not None]

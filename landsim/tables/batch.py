@@ -13,6 +13,10 @@ if TYPE_CHECKING:
 QUANTILES = (0.05, 0.5, 0.95)
 WORST = 5
 """Of the worst flights that are named."""
+LONGEST_CAUSE = 28
+"""Characters of an error, which have room in the narrowest terminal."""
+OVERDUE = "took longer than the limit"
+"""What `landsim.batch.process` says of a flight that it ended."""
 
 
 def batch_tables(summary: Mapping[str, Any], width: int = 100) -> "Iterator[RenderableType]":
@@ -29,7 +33,7 @@ def batch_tables(summary: Mapping[str, Any], width: int = 100) -> "Iterator[Rend
 
     of, rates = summary["batch"], summary["rates"]
     yield Text.assemble(
-        f"{one_line(of['scenario'])}, {of['n']} flights from seed {of['seed']} on: ",
+        f"{one_line(of['scenario'])}, {of['n']} flight{'' if of['n'] == 1 else 's'} from seed {of['seed']} on: ",
         (f"{rate_text(rates['success'])} in the box", "bold"),
         f", with {100.0 * of['confidence']:g} % confidence",
     )
@@ -82,14 +86,22 @@ def _touchdown(summary: Mapping[str, Any]) -> Sheet:
     return Sheet(("quantiles", *(f"{100 * p:g} %" for p in QUANTILES), "limits"), rows)
 
 
+def _cause(flight: Mapping[str, Any]) -> str:
+    """Why a flight came to nothing, in a few words."""
+    reason = one_line(flight["reason"] or "")
+    if reason.startswith(OVERDUE):
+        return "time limit"
+    return reason if len(reason) <= LONGEST_CAUSE else reason[: LONGEST_CAUSE - 3] + "..."
+
+
 def _worst(summary: Mapping[str, Any]) -> Sheet:
     flights: Sequence[Mapping[str, Any]] = summary["worst"]["flights"][:WORST]
     rows: list[list[str | Text]] = []
     for flight in flights:
-        what, limit = "", flight["limit"]
+        what, limit = _cause(flight) if flight["outcome"] == "error" else "", flight["limit"]
         if limit:
             value = number(limit["value"], UNITS.get(limit["unit"], limit["unit"]))
             what = f"{limit['title']} {value} of {limit['limit']:g}"
         box = "in the box" if flight["in_box"] else "not in the box"
         rows.append([str(flight["index"]), flight["outcome"].replace("_", " "), box, what])
-    return Sheet(("worst: flight", "outcome", "", "nearest to or past its limit"), rows)
+    return Sheet(("worst: flight", "outcome", "", "nearest limit, or the error"), rows)

@@ -53,7 +53,8 @@ def _touchdown(metrics: Mapping[str, Any]) -> Sheet:
         bounds = " … ".join(f"{limit['limit']:g}" for limit in known)
         bounds = f"{sign} {bounds}{'' if unit == '°' else ' '}{unit}".lstrip() if known else ""
         kept = all(limit["ok"] for limit in known)
-        mark = Text("" if not known else "ok" if kept else "out", style="green" if kept else "red")
+        told = "" if not known else "ok" if kept else "not reached" if value is None else "out"
+        mark = Text(told, style="green" if kept else "red")
         rows.append([name, number(value, unit), bounds, mark])
 
     row("past the threshold", touchdown.get("x_m"), "m", "", "along_min_m", "along_max_m")

@@ -10,4 +10,5 @@
     consistency    normalised errors against their bounds, coverage of the predicted 95 %
     sensitivity    which draws matter, by rank correlation
     worst          the flights nearest to a limit, or beyond it
+    words          numbers as sentences, tables and figures have them
 """

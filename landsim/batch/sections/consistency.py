@@ -7,6 +7,7 @@ import numpy as np
 
 from landsim.batch.flights import Flights
 from landsim.batch.row import PHASES
+from landsim.batch.sections.words import number
 from landsim.batch.stats import CONFIDENCE, chi_square_bounds, mean_interval, quantile_interval
 from landsim.log import QUANTITIES
 
@@ -95,16 +96,16 @@ _READING = (
 
 def _text(nees: list[dict[str, Any]], coverage: list[dict[str, Any]]) -> list[str]:
     means = [
-        f"{entry['phase']}, {entry['dof']} states: mean {entry['mean']:.3g} (median of the flights"
-        f" {entry['median']['value']:.3g}), expected {entry['dof']}, bounds"
-        f" {entry['bound_low']:.3g} to {entry['bound_high']:.3g} over {entry['flights']} flights:"
-        f" {_MEANS[entry['verdict']]} (errors {entry['errors_over_sigma']:.2f} of the predicted σ)."
+        f"{entry['phase']}, {entry['dof']} states: mean {number(entry['mean'])} (median of the flights"
+        f" {number(entry['median']['value'])}), expected {entry['dof']}, bounds"
+        f" {number(entry['bound_low'])} to {number(entry['bound_high'])} over {entry['flights']} flights:"
+        f" {_MEANS[entry['verdict']]} (errors {number(entry['errors_over_sigma'])} times the predicted σ)."
         for entry in nees
         if entry["verdict"] is not None
     ]
     shares = [
-        f"{entry['quantity'].rsplit('_', 1)[0]}: {100.0 * entry['mean']:.3g} % of the frames are within the predicted"
-        f" 95 %, between {100.0 * entry['low']:.3g} % and {100.0 * entry['high']:.3g} %, which"
+        f"{entry['quantity'].rsplit('_', 1)[0]}: {number(100.0 * entry['mean'])} % of the frames are within the"
+        f" predicted 95 %, between {number(100.0 * entry['low'])} % and {number(100.0 * entry['high'])} %, which"
         f" {'agrees' if entry['agrees'] else 'does not agree'} with {100.0 * EXPECTED:g} %."
         for entry in coverage
         if entry["agrees"] is not None

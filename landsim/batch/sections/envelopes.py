@@ -11,6 +11,7 @@ from estimator.so3 import Array
 from landsim.batch.flights import Flights
 from landsim.batch.published import NAVIGATION, NO_CLAIM
 from landsim.batch.row import ESTIMATES
+from landsim.batch.sections.words import flights_for
 from landsim.batch.stats import CONFIDENCE
 from landsim.config import load_scenario
 from landsim.log import QUANTITIES
@@ -27,7 +28,10 @@ _OVER = (
     "Percentiles are over the flights that have an estimate at a distance, and the share of those in the air there that"
     " do stands beside them: where it is low, the percentiles are those of the better frames."
 )
-_LEFT_OUT = "A percentile is left out where the flights are too few for it: fewer than 1/(1 − p)."
+_LEFT_OUT = (
+    "A percentile is left out where the flights are too few for it, fewer than 1/(1 − p): 95 % takes"
+    f" {flights_for(LEVELS['p95'])} with an estimate at the distance, 99.73 % takes {flights_for(LEVELS['p99_7'])}."
+)
 
 
 def envelopes(flights: Flights) -> dict[str, Any]:
@@ -48,7 +52,7 @@ def envelopes(flights: Flights) -> dict[str, Any]:
         "in_the_air": airborne.sum(axis=0),
         "series": series,
         "bounds": [
-            bound | {"p95_within_from_m": {s: _within_from(distance, series, s, bound) for s in ESTIMATES}}
+            bound | {"p95": {s: _judged(distance, series, s, bound["quantity"], *_level(bound)) for s in ESTIMATES}}
             for bound in paper_bounds()
         ],
         "limits": [
@@ -58,6 +62,10 @@ def envelopes(flights: Flights) -> dict[str, Any]:
                 "distance_m": [point[0] for point in limit.points],
                 "value": [point[1] for point in limit.points],
                 "source": f"{limit.source}; {NO_CLAIM}",
+                "p95": {
+                    s: _judged(distance, series, s, limit.quantity, *map(np.array, zip(*limit.points, strict=True)))
+                    for s in ESTIMATES
+                },
             }
             for limit in NAVIGATION
         ],
@@ -135,15 +143,48 @@ def paper_bounds() -> list[dict[str, Any]]:
     ]
 
 
-def _within_from(distance: Array, series: list[dict[str, Any]], source: str, bound: dict[str, Any]) -> float | None:
-    """From which of its distances on, to the nearest, the 95th percentile keeps to a bound; None if it does not."""
-    (p95,) = (s["p95"] for s in series if s["source"] == source and s["quantity"] == bound["quantity"])
-    there = (distance <= bound["from_m"]) & (distance >= bound["to_m"]) & np.isfinite(p95)
-    kept = p95[there] <= bound["value"]
-    if not kept.size or not kept[-1]:
-        return None
-    first = int(np.flatnonzero(~kept)[-1]) + 1 if not kept.all() else 0
-    return float(distance[there][first])
+def _level(bound: dict[str, Any]) -> tuple[Array, Array]:
+    """Distances and values of a bound that is the same all along."""
+    return np.array((bound["from_m"], bound["to_m"])), np.full(2, bound["value"])
+
+
+def _judged(
+    distance: Array, series: list[dict[str, Any]], source: str, quantity: str, where: Array, limit: Array
+) -> dict[str, Any]:
+    """Whether the 95th percentile keeps to a limit, where the flights are enough to have one.
+
+    Parameters
+    ----------
+    distance : (m,) array
+        Falling.
+    series : list of dict
+        Of the section.
+    source, quantity : str
+    where, limit : (k,) array
+        Distances, falling, and the limit at each; straight lines between them.
+
+    Returns
+    -------
+    dict
+        ``state``: ``kept`` at every distance that has a percentile, ``broken`` at one or more, ``too few`` flights for
+        a percentile at any, or ``none`` where there is no estimate; ``first_m`` and ``last_m``, how far those
+        distances reach; ``within_from_m``, from which of them on it is kept to the last, None if it is not.
+    """
+    (of,) = (s for s in series if s["source"] == source and s["quantity"] == quantity)
+    over = (distance <= where[0]) & (distance >= where[-1])
+    judged = over & np.isfinite(of["p95"])
+    if not judged.any():
+        state = "too few" if np.any(of["count"][over]) else "none"
+        return {"state": state, "first_m": None, "last_m": None, "within_from_m": None}
+    at = distance[judged]
+    kept = of["p95"][judged] <= np.interp(-at, -where, limit)
+    rest = int(np.flatnonzero(~kept)[-1]) + 1 if not kept.all() else 0
+    return {
+        "state": "kept" if kept.all() else "broken",
+        "first_m": float(at[0]),
+        "last_m": float(at[-1]),
+        "within_from_m": float(at[rest]) if rest < at.size else None,
+    }
 
 
 def _at(ordered: Array, rows: Array) -> Array:

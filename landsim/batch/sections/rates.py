@@ -6,6 +6,7 @@ import numpy as np
 
 from landsim.batch.flights import Flights
 from landsim.batch.measures import box_of
+from landsim.batch.sections.words import number, several
 from landsim.batch.stats import CONFIDENCE, flights_needed, rate, upper_bound
 from landsim.config import Scenario
 
@@ -67,19 +68,22 @@ def _text(found: dict[str, Any], n: int, sampling: str) -> list[str]:
     if n == 0:
         return ["No flight was flown: nothing is shown."]
     success, shown, percent = found["success"], found["can_show"], f"{100.0 * CONFIDENCE:g} %"
-    failures = f"{shown['failures']} failure{'' if shown['failures'] == 1 else 's'}"
-    needed = " and ".join(f"{p['n']:,} flights for {p['failure_rate']:.3g}" for p in shown["needed_without_failure"])
+    failures = several(shown["failures"], "failure")
+    needed = " and ".join(
+        f"{p['n']:,} flights for {number(p['failure_rate'])}" for p in shown["needed_without_failure"]
+    )
     rate_text = (
-        f"{success['count']} of {n} flights landed in the box: a success rate of {100.0 * success['rate']:.4g} %,"
-        f" between {100.0 * success['low']:.4g} % and {100.0 * success['high']:.4g} % with {percent} confidence."
+        f"{success['count']} of {n} flights landed in the box: a success rate of"
+        f" {number(100.0 * success['rate'], 4)} %, between {number(100.0 * success['low'], 4)} % and"
+        f" {number(100.0 * success['high'], 4)} % with {percent} confidence."
     )
     bound_text = (
-        f"With {failures} in {n} flights the rate of failure is below {shown['failure_rate_below']:.3g} with {percent}"
-        " confidence; no claim below that is supported."
+        f"With {failures} in {n} flights the rate of failure is below {number(shown['failure_rate_below'])} with"
+        f" {percent} confidence; no claim below that is supported."
     )
     seen_text = (
-        f"A failure that happens in {shown['seen_at_least_once_from']:.3g} of all flights or more would have been seen"
-        f" at least once with {percent} confidence; a rarer one may be there unseen."
+        f"A failure that happens in {number(shown['seen_at_least_once_from'])} of all flights or more would have been"
+        f" seen at least once with {percent} confidence; a rarer one may be there unseen."
     )
     needed_text = f"Without a single failure it takes {needed} to show that the rate of failure is below it."
     text = [rate_text, bound_text, seen_text, needed_text]

@@ -48,8 +48,12 @@ FEW = 4
 
 
 def inputs_of(flights: Flights) -> dict[str, Array]:
-    """What varies from flight to flight before it begins, by key: the draws, then the start as drawn by the seed."""
-    columns = [f"{DRAW}{key}" for key in flights.draws] + [f"start_{name}" for name in START]
+    """What varies from flight to flight before it begins, by key: the draws, then the start as drawn by the seed.
+
+    A part of the start that a dispersion draws is that dispersion, and stands there once.
+    """
+    seeded = [f"start_{name}" for name in START if f"start.{name}" not in flights.draws]
+    columns = [*(f"{DRAW}{key}" for key in flights.draws), *seeded]
     found = {name.removeprefix(DRAW): flights.numbers(name) for name in columns}
     return {key: values for key, values in found.items() if _varies(values)}
 
@@ -126,6 +130,6 @@ def _text(entries: list[dict[str, Any]], results: list[Result], tests: int, n: i
             if e["spread"]["significant"]
         ]
         found.sort(key=lambda one: -abs(one[0]))
-        named = ", ".join(f"{what} ({rho:+.2f})".replace("-", "−") for rho, what in found[:NAMED])
+        named = ", ".join(f"{what} ({rho:+.2f})".replace("(-", "(−") for rho, what in found[:NAMED])
         text.append(f"{result.title}: {named or 'no draw matters significantly'}.")
     return text

@@ -7,10 +7,29 @@
     const places = document.getElementById(`figure-${figure.name}`).querySelectorAll(".plot");
     figure.panels.forEach((panel, i) => plots.push({ place: places[i], panel }));
   }
-  const draw = ({ place, panel }) => {
+  // Between the powers of ten of a logarithmic axis there are numbers where there is room for them.
+  const FEW_DECADES = 1.3;
+  const logTicks = (place) => {
+    const change = {};
+    for (const name of ["xaxis", "yaxis"]) {
+      const axis = place.layout[name];
+      const dtick = Math.abs(axis.range[1] - axis.range[0]) > FEW_DECADES ? 1 : "D2";
+      if (axis.type === "log" && axis.dtick !== dtick) change[`${name}.dtick`] = dtick;
+    }
+    if (Object.keys(change).length) Plotly.relayout(place, change);
+  };
+
+  const drawn = new Set();
+  const draw = (one) => {
+    const { place, panel } = one;
+    if (drawn.has(one)) return Promise.resolve();
+    drawn.add(one);
     panel.height = panel.layout.height; // Plotly writes into the layout
     place.style.height = `${panel.height}px`;
-    return Plotly.newPlot(place, panel.data, panel.layout, config).then(() => place.classList.add("drawn"));
+    return Plotly.newPlot(place, panel.data, panel.layout, config).then(() => {
+      place.classList.add("drawn");
+      place.on("plotly_relayout", () => logTicks(place));
+    });
   };
 
   // What is in sight is drawn first, the rest when there is time: a page of fifty panels is there at once.
@@ -27,13 +46,15 @@
     document.body.classList.add("ready");
   };
 
-  // On paper each panel is as wide as its column there, and less high; afterwards it is as it was.
+  // On paper each panel is as wide as its column there, and less high; afterwards it is as it was.  Plotly draws before
+  // it returns, so that what was still waiting for its turn is on the sheet too.
   const PAPER = 680;
   const GAP = 16;
   const LOWER = 0.6;
-  const drawn = () => plots.filter(({ place }) => place.classList.contains("drawn"));
   window.addEventListener("beforeprint", () =>
-    drawn().forEach(({ place, panel }) => {
+    plots.forEach((one) => {
+      draw(one);
+      const { place, panel } = one;
       const columns = place.closest(".columns-1") ? 1 : 2;
       const height = Math.round((place.closest(".list, .grid") ? 1 : LOWER) * panel.height);
       place.style.height = `${height}px`;
@@ -41,7 +62,7 @@
     }),
   );
   window.addEventListener("afterprint", () =>
-    drawn().forEach(({ place, panel }) => {
+    plots.forEach(({ place, panel }) => {
       place.style.height = `${panel.height}px`;
       Plotly.relayout(place, { width: null, height: panel.height, autosize: true });
     }),
