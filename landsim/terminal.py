@@ -1,5 +1,7 @@
 """What the command line needs of a terminal: streams that are there, one-line errors, a status line, a progress bar."""
 
+import _thread
+import codecs
 import io
 import os
 import signal
@@ -16,12 +18,26 @@ import click
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
+    from rich.text import Text
 
 EXIT_FAILURE = 1
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 WIDTH = 100
 """Of tables that are not printed to a terminal."""
+NARROW = 72
+"""Columns of a terminal in which a bar and what is told beside it have no room for each other."""
+SAME_REQUEST_S = 1.0
+"""A signal that follows another sooner means the same: a group and its leader are both told to end."""
+SWALLOWED_AGAIN_S = 0.05
+"""After which an interrupt is raised again that was raised where Python drops exceptions."""
+IN_ASCII = {
+    "±": "+/-", "≤": "<=", "≥": ">=", "…": "...", "–": "-", "—": "-", "−": "-", "°": " deg", "σ": "sigma", "χ": "chi",
+    "ρ": "rho", "·": "*", "×": "x", "→": "->", "²": "^2", "³": "^3", "µ": "u", "“": '"', "”": '"', "’": "'",
+}  # fmt: skip
+"""How characters are spelled where a stream's encoding has them not."""
+SPELLED = "landsim-spelled"
+"""The error handler of streams that does it."""
 
 
 def fail(message: str, code: int) -> NoReturn:
@@ -42,31 +58,97 @@ def tell(message: str) -> None:
 
 
 def make_printable() -> None:
-    """Standard streams that take every character, and that are there."""
+    """Standard streams that take every character, in ASCII what their encoding has not, and that are there."""
+    codecs.register_error(SPELLED, _spelled)
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:  # closed by who started this process
             setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
         elif isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
+            stream.reconfigure(errors=SPELLED)
+
+
+def _spelled(failure: UnicodeError) -> tuple[str, int]:
+    """What is written in the place of characters that a stream cannot carry."""
+    if not isinstance(failure, UnicodeEncodeError):
+        raise failure
+    return "".join(IN_ASCII.get(c, "?") for c in failure.object[failure.start : failure.end]), failure.end
 
 
 @contextmanager
-def terminable() -> Iterator[None]:
-    """Within it SIGTERM interrupts like Ctrl-C, so that nothing half-written stays behind; a second one is ignored."""
+def terminable() -> Iterator[Callable[[], bool]]:
+    """Within it SIGTERM interrupts like Ctrl-C, so that nothing half-written stays behind, and neither gets lost.
 
-    def interrupt(_number: int, _frame: FrameType | None) -> NoReturn:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    Python drops an exception that is raised in a destructor or in the callback of a weak reference, and prints it: such
+    an interrupt is raised again.  One that has been dropped elsewhere is raised at the end, so that whatever becomes of
+    it, what was interrupted does not end as if it had not been.
+
+    Yields
+    ------
+    callable
+        Whether there was a signal.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If there was a signal, and what was done inside has come to its end all the same.
+    """
+    if threading.current_thread() is not threading.main_thread():  # only that one is told of signals
+        yield lambda: False
+        return
+    interrupts = _Interrupts()
+    taken = [
+        (number, was)
+        for number, usual in ((signal.SIGTERM, signal.SIG_DFL), (signal.SIGINT, signal.default_int_handler))
+        if (was := signal.getsignal(number)) == usual  # who began this process may have had it ignored
+    ]
+    tells = sys.unraisablehook
+    interrupts.tells = tells
+    for number, _ in taken:
+        signal.signal(number, interrupts.take)
+    sys.unraisablehook = interrupts.dropped
+    try:
+        yield lambda: interrupts.last is not None
+    finally:
+        interrupts.over = True
+        sys.unraisablehook = tells
+        for number, was in taken:
+            signal.signal(number, was)
+    if interrupts.last is not None:
         raise KeyboardInterrupt
 
-    ours = threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
-    if ours:
-        signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        if ours:
-            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+class _Interrupts:
+    """What has come of signals."""
+
+    def __init__(self) -> None:
+        self.last: float | None = None
+        """When a signal was last taken for a request to end."""
+        self.again = False
+        self.over = False
+        self.tells: Callable[[Any], object] = sys.__unraisablehook__
+
+    def take(self, _number: int, _frame: FrameType | None) -> None:
+        """A signal: the first interrupts, and so does any that comes later than those that mean the same."""
+        now = time.monotonic()
+        if not self.again and self.last is not None and now - self.last < SAME_REQUEST_S:
+            return
+        self.last, self.again = now, False
+        raise KeyboardInterrupt
+
+    def dropped(self, what: Any) -> None:
+        """An exception that Python drops: if it is the interrupt, it is raised again a little later."""
+        if self.last is None or not issubclass(what.exc_type, KeyboardInterrupt):
+            self.tells(what)
+            return
+        later = threading.Timer(SWALLOWED_AGAIN_S, self._raise_again)  # here it would be dropped once more
+        later.daemon = True
+        later.start()
+
+    def _raise_again(self) -> None:
+        if not self.over:
+            self.again = True
+            _thread.interrupt_main()
 
 
 @contextmanager
@@ -81,7 +163,7 @@ def printing(done: str = "") -> Iterator[None]:
             return
         reason = f"standard output cannot be written: {error.strerror}"
         if not done:
-            fail(reason, EXIT_FAILURE)
+            fail(reason, EXIT_BAD_INPUT)
         tell(f"{done}; {reason}")
 
 
@@ -99,9 +181,27 @@ def console_of(*, stderr: bool = False) -> "Console":
 
     from landsim.tables import NARROWEST
 
-    console = Console(stderr=stderr, highlight=False)
+    stream = sys.stderr if stderr else sys.stdout
+
+    class Spelling(Console):
+        def render_str(self, text: str, **how: Any) -> "Text":
+            """Of a cell, spelled before it is laid out, so that the columns stay straight."""
+            return super().render_str(carried(text, stream), **how)
+
+    console = Spelling(stderr=stderr, highlight=False)
     console.width = max(console.width, NARROWEST) if console.is_terminal else WIDTH
     return console
+
+
+def carried(text: str, stream: Any) -> str:
+    """The text as a stream's encoding carries it: in ASCII what it has not."""
+    encoding = getattr(stream, "encoding", None) or "utf-8"
+    try:
+        text.encode(encoding)
+    except UnicodeEncodeError:
+        codecs.register_error(SPELLED, _spelled)
+        return text.encode(encoding, SPELLED).decode(encoding)
+    return text
 
 
 def print_tables(made: "Callable[[int], Iterable[RenderableType]]") -> None:
@@ -154,12 +254,15 @@ def progress_bar(text: str) -> "Iterator[Callable[[float, float, str], None] | N
         yield None
         return
     from rich.markup import escape
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
-    with Progress(
-        *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console_of(stderr=True), transient=True
-    ) as bar:
+    console = console_of(stderr=True)
+    percent = TextColumn("{task.percentage:3.0f} %")
+    columns: list[ProgressColumn] = [TextColumn("{task.description}"), BarColumn(), percent]
+    columns += [TimeElapsedColumn(), TimeRemainingColumn()]
+    if console.width < NARROW:
+        columns = [percent, TimeElapsedColumn(), TimeRemainingColumn()]
+    with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task(escape(text), total=None)
         yield lambda done, total, what: bar.update(
             task, completed=done, total=total, description=escape(f"{text}: {what}")
@@ -207,9 +310,19 @@ class FlightRate:
         rate = self.per_second
         if rate is None:
             return "starting" if not self.flown else f"{self.succeeded} of {self.flown} in the box"
-        left = round((self.total - self.done) / rate)
-        told = f"{rate:.1f} flights/s, {left // 3600}:{left // 60 % 60:02d}:{left % 60:02d} left"
+        told = f"{rate:.1f} flights/s, {self._left(rate)} left"
         return f"{told}, {100.0 * self.succeeded / self.flown:.1f} % in the box"
+
+    def short(self) -> str:
+        """The same where there is room for little: for how long still, and how many of them succeed."""
+        rate = self.per_second
+        if rate is None:
+            return "starting" if not self.flown else f"{self.succeeded} in box"
+        return f"{self._left(rate)}, {100.0 * self.succeeded / self.flown:.1f} % in box"
+
+    def _left(self, rate: float) -> str:
+        left = round((self.total - self.done) / rate)
+        return f"{left // 3600}:{left // 60 % 60:02d}:{left % 60:02d}"
 
 
 @contextmanager
@@ -220,15 +333,20 @@ def flight_progress(text: str, rate: FlightRate) -> "Iterator[Callable[[bool], N
             yield count
         return
     from rich.markup import escape
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[told]}"))
-    with Progress(*columns, console=console_of(stderr=True), transient=True) as bar:
-        task = bar.add_task(escape(text), total=rate.total, completed=rate.done, told=rate.text())
+    console = console_of(stderr=True)
+    columns: list[ProgressColumn] = [MofNCompleteColumn(separator=" of "), TextColumn("{task.fields[told]}")]
+    tells = rate.short
+    if console.width >= NARROW:
+        columns = [TextColumn("{task.description}"), BarColumn(None), MofNCompleteColumn(), columns[-1]]
+        tells = rate.text
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task(escape(text), total=rate.total, completed=rate.done, told=tells())
 
         def count(success: bool) -> None:
             rate.add(success=success)
-            bar.update(task, completed=rate.done, told=rate.text())
+            bar.update(task, completed=rate.done, told=tells())
 
         yield count
 
@@ -243,6 +361,6 @@ def _plain_progress(text: str, rate: FlightRate) -> "Iterator[Callable[[bool], N
         now = rate.clock()
         if now - last >= PLAIN_EVERY_S:
             last = now
-            tell(f"{text}: {rate.done} of {rate.total} flights, {rate.text()}")
+            tell(f"{text}: {rate.done} of {rate.total} flight{'' if rate.total == 1 else 's'}, {rate.text()}")
 
     yield count

@@ -1,7 +1,9 @@
 """Batches by the command line: what is printed, written and refused, and what an interrupt leaves."""
 
+import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -9,6 +11,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from batches import SHORT, same, table
@@ -72,6 +75,14 @@ def when_chunks(folder: Path, count: int, process: "subprocess.Popen[str]") -> N
     pytest.fail("no chunks")
 
 
+def copied(flown: Path, to: Path, *more: str) -> Path:
+    """A batch in another folder, without its summary."""
+    to.mkdir()
+    for name in ("batch.json", "flights.parquet", "scenario.toml", *more):
+        (to / name).write_bytes((flown / name).read_bytes())
+    return to
+
+
 def kept(folder: Path) -> int:
     return sum(pq.read_metadata(path).num_rows for path in folder.glob("chunks/*.parquet"))
 
@@ -104,9 +115,7 @@ class TestBatch:
         assert read_run(tmp_path / "grown" / "kept" / "5").metrics["seed"] == 5
 
     def test_a_report_now_or_later(self, landsim: Run, flown: Path, tmp_path: Path) -> None:
-        for name in ("batch.json", "flights.parquet", "scenario.toml"):
-            (tmp_path / "copy").mkdir(exist_ok=True)
-            (tmp_path / "copy" / name).write_bytes((flown / name).read_bytes())
+        copied(flown, tmp_path / "copy")
         code, out, _ = landsim("plot", "copy")
         assert code == 0
         assert "  copy/report.html\n" in out
@@ -121,6 +130,54 @@ class TestBatch:
         assert [batch["name"] for batch in compared["batches"]] == ["whole", "finer"]
         assert "camera.noise_px" in [setting["key"] for setting in compared["settings"]]
         assert "5 common seeds" in out
+
+    def test_what_no_longer_describes_it_is_removed(self, landsim: Run, flown: Path, tmp_path: Path) -> None:
+        """A report of six flights and what a killed process was drawing, but nothing of somebody else's."""
+        copy = copied(flown, tmp_path / "b", "summary.json")
+        mine = {"notes.png", ".notes.png.part", "x.pdf"}
+        for name in ("report.html", "rates.png", "rates.pdf", ".report.html.part", ".rates.pdf.part", *mine):
+            (copy / name).write_text("")
+        (copy / "rates").mkdir()
+        code, _, err = landsim(
+            "batch", "landing", *SETTINGS, "-n", "7", "--resume", "--no-report", "--workers", "1", "--out", "b"
+        )
+        told = "removed report.html and 2 figures, of 6 flights: the batch goes on to 7; landsim plot draws them again"
+        assert (code, err.splitlines()[0]) == (0, f"landsim: b: {told}")
+        assert err.splitlines()[-1].startswith("landsim: 1 flight in ")
+        own = {".lock", "batch.json", "flights.parquet", "scenario.toml", "summary.json"}
+        assert {path.name for path in copy.iterdir()} == own | mine | {"rates"}
+        assert json.loads((copy / "summary.json").read_text())["batch"]["n"] == 7
+        (copy / "report.html").write_text("")
+        code, _, err = landsim("batch", "landing", *SETTINGS, "--resume", "--no-report", "--out", "b")
+        assert (code, err, (copy / "report.html").exists()) == (0, "", True)
+
+    def test_tables_that_were_written_over_are_refused(self, landsim: Run, flown: Path, tmp_path: Path) -> None:
+        copy = copied(flown, tmp_path / "b")
+        whole = table(flown)
+        at = whole.column_names.index("seed")
+        pq.write_table(whole.set_column(at, "seed", pa.array([0, 1, 2, 3, 4, 9])), copy / "flights.parquet")
+        resumed = ("batch", "landing", *SETTINGS, "--resume", "--out", "b")
+        for arguments in (("compare", str(flown), "b"), ("plot", "b"), ("replay", "b", "0"), resumed):
+            code, out, err = landsim(*arguments)
+            assert (code, out, len(err.splitlines())) == (2, "", 1)
+            assert "b/flights.parquet: flight 5 has the seed 9; it must be 5, the batch's first plus the index" in err
+
+    def test_flights_that_are_missing_are_told(self, landsim: Run, flown: Path, tmp_path: Path) -> None:
+        copy = copied(flown, tmp_path / "b")
+        stored = json.loads((copy / "batch.json").read_text())
+        (copy / "batch.json").write_text(json.dumps(stored | {"n": 9}))
+        code, out, err = landsim("compare", str(flown), "b", "--no-report")
+        told = "landsim: b: 6 of its 9 flights are there; landsim batch --resume flies the others\n"
+        assert (code, err, "6 common seeds" in out) == (0, told, True)
+        for arguments, what in (
+            (("compare", "b", "b"), "b: is named twice; a batch is compared with others, not with itself"),
+            (("compare", "b", "./b/../b"), "b/../b: is named twice"),
+            (("compare", "b"), "a comparison needs two batches or more, not 1"),
+            (("merge", "b"), "b: is a whole batch, not a shard of one: there is nothing to merge"),
+            (("merge", "b", "b"), "b: is named twice; name each shard's folder once"),
+        ):
+            code, out, err = landsim(*arguments)
+            assert (code, out, len(err.splitlines()), what in err) == (2, "", 1, True), err
 
     @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
     def test_an_interrupt_keeps_what_was_flown(
@@ -170,7 +227,7 @@ class TestBatch:
             check=False,
         )
         (line,) = [line for line in done.stderr.splitlines() if " flights in " not in line]
-        assert (done.returncode, done.stdout) == (1, "")
+        assert (done.returncode, done.stdout) == (2, "")
         assert "flights.parquet: cannot be written: File too large; what was flown is kept; to go on: " in line
         assert kept(tmp_path / "b") == 6
         resumed = begin(*common[1:], "--resume", cwd=tmp_path)
@@ -203,20 +260,22 @@ class TestReplay:
 
 REFUSED: list[tuple[list[str], str]] = [
     (["batch", "landing"], "-n N is missing"),
-    (["batch", "landing", "-n", "0"], "n: must be 1 to"),
+    (["batch", "landing", "-n", "0"], "must be a whole number, 1 or more, not 0"),
     (["batch", "landing", "-n", "1" + 30 * "0"], "n: must be 1 to"),
-    (["batch", "landing", "-n", "-3"], "must be a whole number"),
+    (["batch", "landing", "-n", "-3"], "must be a whole number, 1 or more, not -3"),
     (["batch", "landing", "-n", "2.5"], "must be a whole number"),
     (["batch", "landing", "-n", "5", "--seed", "x"], "must be a whole number"),
     (["batch", "landing", "-n", "5", "--seed", str(2**63)], "seed: must leave room"),
-    (["batch", "landing", "-n", "5", "--workers", "0"], "--workers must be 1 to"),
+    (["batch", "landing", "-n", "5", "--workers", "0"], "must be a whole number, 1 or more, not 0"),
+    (["batch", "landing", "-n", "5", "--workers", "1025"], "--workers must be at most 1024, not 1025"),
     (["batch", "landing", "-n", "5", "--shard", "4/3"], "shard: must be i/n"),
     (["batch", "landing", "-n", "5", "--engine", "ray"], "ray"),
     (["batch", "landing", "-n", "5", "--scheduler", "tcp://127.0.0.1:1"], "needs --engine dask"),
     (["batch", "landing", "-n", "5", "--keep", "some"], "some"),
     (["batch", "landing", "-n", "5", "--time-limit", "0"], "time limit: must be above 0"),
     (["batch", "landing", "-n", "5", "--time-limit", "nan"], "time limit: must be above 0"),
-    (["batch", "landing", "-n", "5", "--chunk", "0"], "chunk: must be 1 to"),
+    (["batch", "landing", "-n", "5", "--chunk", "0"], "must be a whole number, 1 or more, not 0"),
+    (["batch", "landing", "-n", "5", "--chunk", "100001"], "chunk: must be 1 to"),
     (["batch", "landing", "-n", "5", "--resume"], "--resume needs --out"),
     (["batch", "landing", "-n", "5", "--resume", "--out", "new"], "batch.json is missing"),
     (["batch", "landing", "-n", "5", "--out", "full"], "is not empty"),
@@ -228,7 +287,8 @@ REFUSED: list[tuple[list[str], str]] = [
     (["merge", "nosuch"], "is not a batch"),
     (["replay", "full", "0"], "is not a batch"),
     (["replay", "full", "x"], "must be a whole number"),
-    (["compare", "full", "full"], "is not a batch"),
+    (["compare", "full", "full"], "is named twice"),
+    (["compare", "full", "nosuch"], "is not a batch"),
 ]
 
 
@@ -248,7 +308,8 @@ def test_a_dispersion_that_makes_no_scenario_is_refused(landsim: Run, tmp_path: 
     draws = 'dispersions.draw=[{key="camera.noise_px", distribution="normal", mean=0.5, sigma=5.0}]'
     code, out, err = landsim("batch", "landing", "-n", "50", "--set", draws)
     assert (code, out, len(err.splitlines())) == (2, "", 1)
-    assert "camera.noise_px" in err
+    assert "normal draws -29.5 too, 6 sigma out, but camera.noise_px must be at least 0; use" in err
+    assert landsim("check", "landing", "--set", draws) == (2, "", err)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -270,6 +331,29 @@ def test_a_resumed_batch_is_the_same_batch(landsim: Run, flown: Path) -> None:
 
 
 class TestRate:
+    def test_it_fits_a_narrow_terminal(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        class Terminal(io.StringIO):
+            def isatty(self) -> bool:
+                return True
+
+        for columns in (40, 100):
+            screen, now = Terminal(), 0.0
+            monkeypatch.setattr(sys, "stderr", screen)
+            monkeypatch.setenv("COLUMNS", str(columns))
+            monkeypatch.setenv("TERM", "xterm")
+            monkeypatch.setenv("NO_COLOR", "1")
+            with flight_progress("dispersed, seed 0", FlightRate(10000, 9000, lambda: now)) as count:  # noqa: B023
+                for _ in range(3):
+                    now += 0.07
+                    count(False)
+                time.sleep(0.2)  # it is drawn ten times a second
+            lines = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue()).replace("\r", "\n").split("\n")
+            shown = [line.rstrip() for line in lines if " of 10000" in line or "/10000" in line]
+            assert shown
+            assert max(map(len, shown)) <= columns
+            assert "0.0 % in" in shown[-1]
+            assert max(line.count("0:01:10") for line in lines) == 1
+
     def test_the_start_does_not_count(self) -> None:
         times = iter([100.0, 100.5, 101.0, 102.0])
         rate = FlightRate(20, 4, lambda: next(times))

@@ -2,6 +2,7 @@
 
 import os
 import random
+import shutil
 import signal
 import threading
 import time
@@ -9,11 +10,13 @@ from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future,
 from pathlib import Path
 from typing import Any
 
+import batches
 import pytest
-from batches import drawn, fly_into, hang_without_python, identity, made_up, same, short, spoiled, table
+from batches import drawn, fly_into, hang_without_python, identity, same, short, spoiled, table
 
 from landsim.batch.chunks import BatchStopped
 from landsim.batch.cluster import on_dask
+from landsim.batch.deferred import uninterrupted
 from landsim.batch.engine import Engine, on_processes, rows_of_jobs
 from landsim.batch.folder import open_batch
 from landsim.batch.job import Job, Keeper, KeepError, fly_job, jobs_of
@@ -24,6 +27,11 @@ from landsim.batch.row import Row
 from landsim.errors import InputError, RunFolderError
 from landsim.log import load_log
 from landsim.runs import write_run
+
+
+def made_up(*asked: Any) -> Row:
+    """A row that was not flown, with an outcome that there is."""
+    return batches.made_up(*asked) | {"outcome": "landed"}
 
 
 def say(text: str, size: int) -> bytes:
@@ -44,6 +52,34 @@ class TwoPartsError(Exception):
 
 def fail_in_two_parts() -> None:
     raise TwoPartsError(1, 2)
+
+
+class TestUninterrupted:
+    def test_a_signal_is_taken_at_the_end(self) -> None:
+        before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+        steps = []
+        with pytest.raises(KeyboardInterrupt), uninterrupted():
+            signal.raise_signal(signal.SIGINT)
+            steps.append("to its end")
+        assert steps == ["to its end"]
+        assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+
+    def test_flights_are_handed_over_as_a_whole(self) -> None:
+        """An interrupt in the middle of a future's methods would leave its lock taken."""
+        futures: list[Future[Any]] = []
+
+        class Interrupted(Executor):
+            def submit(self, *_: Any, **__: Any) -> "Future[Any]":
+                if not futures:
+                    signal.raise_signal(signal.SIGINT)
+                futures.append(Future())
+                futures[-1].set_result({})
+                return futures[-1]
+
+        jobs = (Job(index, index) for index in range(9))
+        with pytest.raises(KeyboardInterrupt):
+            list(rows_of_jobs(jobs, lambda _: {}, lambda *_: {}, Engine(Interrupted(), 3)))
+        assert len(futures) == 3
 
 
 class TestProcesses:
@@ -362,8 +398,12 @@ class TestMerge:
             return str(caught.value)
 
         scenario = short()
-        assert "shard 2/3 is missing" in told([shards[0], shards[2]])
-        assert "is shard 1/3, and so is" in told([shards[0], shards[0], shards[1]])
+        assert "there are 2: shard 2/3 of the batch is missing" in told([shards[0], shards[2]])
+        assert "1 is shard 1/3 alone: shards 2/3, 3/3 of the batch are missing" in told(shards[:1])
+        assert "1: is named twice" in told([shards[0], shards[1], tmp_path / "x" / ".." / "1"])
+        shutil.copytree(shards[0], tmp_path / "copy")
+        assert "is shard 1/3, and so is" in told([shards[0], tmp_path / "copy", shards[1]])
+        assert "is a whole batch, not a shard of one" in told([tmp_path / "whole"])
         for name, wanted, what in (
             ("n", identity(scenario, 12, shard="2/3"), "its n differs: 11 there and 12 here"),
             ("seed", identity(scenario, 11, seed=1, shard="2/3"), "its seed differs"),

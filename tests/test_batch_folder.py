@@ -2,14 +2,17 @@
 
 import errno
 import json
+import math
 import os
 from pathlib import Path
 from typing import Any
 
+import batches
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from batches import drawn, equal, fly_into, identity, made_up, same, short, table
+from batches import drawn, equal, fly_into, identity, same, short, table
 
 from landsim.batch.chunks import BatchStopped, Chunks
 from landsim.batch.folder import check_new, load_batch, locked, open_batch
@@ -19,7 +22,9 @@ from landsim.batch.job import Job
 from landsim.batch.replay import find_flight, first_difference
 from landsim.batch.row import Row
 from landsim.batch.rows import save_rows
+from landsim.batch.verify import check_flights
 from landsim.config import Scenario
+from landsim.dispersion import keys_of
 from landsim.errors import InputError, RunFolderError
 
 FINISHED = {".lock", "batch.json", "flights.parquet", "scenario.toml"}
@@ -32,6 +37,11 @@ def names(folder: Path) -> set[str]:
 def indices(path: Path) -> list[int]:
     found: list[int] = pq.read_table(path)["index"].to_pylist()
     return found
+
+
+def made_up(*asked: Any) -> Row:
+    """A row that was not flown, with an outcome that there is."""
+    return batches.made_up(*asked) | {"outcome": "landed"}
 
 
 def never(*_: Any) -> Row:
@@ -159,10 +169,11 @@ class TestFolder:
         interrupted(tmp_path / "b", scenario, 9, 8)
         path = tmp_path / "b" / "chunks" / "00000000-00000003.parquet"
         content = path.read_bytes()
-        half = len(content) // 2
+        column = pq.read_metadata(path).row_group(0).column(20)
+        last = (column.dictionary_page_offset or column.data_page_offset) + column.total_compressed_size - 1
         damaged = {
-            "a bit": content[:half] + bytes([content[half] ^ 0x10]) + content[half + 1 :],
-            "its end": content[:half],
+            "a bit": content[:last] + bytes([content[last] ^ 0x10]) + content[last + 1 :],
+            "its end": content[:last],
             "a name": content.replace(b"outcome", b"outkome"),
             "all of it": b"",
         }
@@ -275,6 +286,8 @@ class TestRefused:
         (folder / "scenario.toml").write_text(text.replace("width_m = 30.0", "width_m = 31.0"))
         with pytest.raises(RunFolderError, match="is not the scenario that the batch was flown with"):
             load_batch(folder)
+        told = self.told(folder, drawn("latin-hypercube"))
+        assert "scenario.toml: is not the scenario that the batch was flown with: runway.width_m is 31.0 there" in told
 
     def test_places_where_no_batch_goes(self, tmp_path: Path) -> None:
         (tmp_path / "file").write_text("")
@@ -336,6 +349,59 @@ def test_a_digest_is_of_names_and_contents(tmp_path: Path) -> None:
     assert digest_of_files(tmp_path) != first
 
 
+class TestDoctored:
+    """Tables that somebody has written over those of the batch."""
+
+    CHANGES: tuple[tuple[str, list[Any] | pa.Array, str], ...] = (
+        ("index", [0, 1, 2, 3, 3], "holds flight 3 2 times; each must be there once"),
+        ("index", [0, 1, 2, 3, 9], "holds flight 9, which does not belong to the batch"),
+        ("index", [0, 1, 2, 3, None], "one of them has no index"),
+        ("seed", [7, 8, 9, 10, 99], "flight 4 has the seed 99; it must be 11, the batch's first plus the index"),
+        ("seed", [7, 8, 9, 10, None], "flight 4 has no seed"),
+        ("seed", ["7", "8", "9", "10", "11"], "column seed must be int64, not string"),
+        ("outcome", [*4 * ["landed"], "flew"], 'flight 4 has the outcome "flew"; there are landed, crashed'),
+        ("in_box", [1, 1, 1, 1, 1], "column in_box must be bool, not int64"),
+        ("draw.camera.noise_px", [*4 * [0.5], None], "flight 4 has no draw.camera.noise_px"),
+        ("draw.camera.noise_px", [*4 * [0.5], math.inf], "flight 4 has no number as draw.camera.noise_px"),
+        ("sigma_cross_m", 5 * [1.0], "column sigma_cross_m must be list<item: double>, not double"),
+    )
+
+    def doctor(self, path: Path, name: str, values: Any) -> None:
+        whole = pq.read_table(path)
+        pq.write_table(whole.set_column(whole.column_names.index(name), name, pa.array(values)), path)
+
+    def test_are_refused_by_whoever_reads_them(self, tmp_path: Path) -> None:
+        scenario = drawn()
+        wanted = identity(scenario, 5, seed=7)
+        fly_into(tmp_path / "b", scenario, wanted, fly=made_up)
+        path = tmp_path / "b" / "flights.parquet"
+        content = path.read_bytes()
+        assert check_flights(path, wanted, keys_of(scenario)) == 5
+        for name, values, told in self.CHANGES:
+            path.write_bytes(content)
+            self.doctor(path, name, values)
+            with pytest.raises(RunFolderError) as caught:
+                check_flights(path, wanted, keys_of(scenario))
+            assert told in str(caught.value)
+            assert str(caught.value).startswith(str(path))
+            with pytest.raises(RunFolderError):
+                find_flight(tmp_path / "b", 2)
+            if not name.startswith("draw."):
+                with pytest.raises(RunFolderError):
+                    fly_into(tmp_path / "b", scenario, wanted, resume=True, fly=never)
+        pq.write_table(pq.read_table(path).drop_columns(["draw.camera.noise_px"]), path)
+        with pytest.raises(RunFolderError, match=r"column draw\.camera\.noise_px is missing"):
+            find_flight(tmp_path / "b", 2)
+
+    def test_a_chunk_is_flown_again(self, tmp_path: Path) -> None:
+        scenario = short()
+        interrupted(tmp_path / "b", scenario, 9, 8)
+        path = tmp_path / "b" / "chunks" / "00000000-00000003.parquet"
+        self.doctor(path, "index", [0, 1, 2, 2])
+        with open_batch(tmp_path / "b", scenario, identity(scenario, 9), resume=True) as batch:
+            assert set(range(4)) <= set(batch.chunks.missing())
+
+
 class TestGather:
     def save(self, path: Path, numbers: list[int]) -> Path:
         save_rows(path, [made_up(short(), None, Job(i, i)) for i in numbers])
@@ -355,6 +421,7 @@ class TestGather:
         one, other = self.save(tmp_path / "one", [0, 1, 2]), self.save(tmp_path / "other", [2, 3])
         for sources, wanted, told in (
             ([one, other], range(4), "flight 2 is in .*one and in .*other"),
+            ([one, one], range(3), "flight 0 is in .*one twice"),
             ([one], range(9), "6 of 9 flights are missing: 3, 4, 5, 6, 7 and 1 more"),
             ([one], range(2), "one: holds flight 2, which does not belong"),
             ([tmp_path / "none"], range(2), "none: cannot be read: No such file"),

@@ -1,14 +1,18 @@
 """The command line: exit codes, one line on stderr, and what is and is not written."""
 
+import errno
 import io
 import json
 import os
 import signal
 import subprocess
 import sys
+import time
 import tomllib
+import weakref
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -16,10 +20,12 @@ from conftest import fake_flight
 from rich.console import Console
 
 from landsim import __version__, cli
+from landsim.batch.folder import SCENARIO_FILE
 from landsim.config import load_scenario
 from landsim.plain import as_json
 from landsim.runs import read_run
-from landsim.tables import flight_tables, number
+from landsim.tables import batch_tables, flight_tables, number
+from landsim.terminal import terminable
 from landsim.threads import THREAD_VARIABLES
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -257,11 +263,67 @@ class TestFailures:
             cli.main(["run", "landing"])
         assert list(tmp_path.iterdir()) == []
 
-    def test_an_interrupt_is_quiet(self, landsim: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_an_interrupt_is_a_line(self, landsim: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         self.fail_with(KeyboardInterrupt(), monkeypatch)
-        code, out, err = landsim("run", "landing")
-        assert (code, out, err.strip()) == (130, "", "")
+        assert landsim("run", "landing") == (130, "", "landsim: interrupted\n")
         assert list(tmp_path.iterdir()) == []
+
+    @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+    @pytest.mark.parametrize("longest", [0.0, 20.0])
+    def test_an_interrupt_that_python_drops_is_not_lost(
+        self,
+        number: signal.Signals,
+        longest: float,
+        landsim: Run,
+        tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        """Raised in the callback of a weak reference: again a little later, or where the command would have ended."""
+
+        def interrupted(_: object) -> None:
+            signal.raise_signal(number)
+            for _ in range(1000):
+                pass
+            raise AssertionError("it went on")
+
+        def fly(scenario: Any, seed: int) -> Any:
+            one = {0}.union()
+            watched = weakref.ref(one, interrupted)
+            del one
+            assert watched() is None
+            end = time.monotonic() + longest
+            while time.monotonic() < end:
+                time.sleep(0.01)
+            return fake_flight()
+
+        monkeypatch.setattr(sys.modules["landsim.simulate"], "fly", fly)
+        begin = time.monotonic()
+        code, _, err = landsim("run", "landing")
+        assert (code, err) == (130, "landsim: interrupted\n")
+        assert time.monotonic() - begin < 15.0
+        assert signal.getsignal(signal.SIGINT) == signal.default_int_handler
+
+    def test_one_that_is_taken_for_something_else(self, landsim: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+        def fly(scenario: Any, seed: int) -> None:
+            try:
+                signal.raise_signal(signal.SIGINT)
+            except KeyboardInterrupt:
+                raise RuntimeError("something failed") from None
+
+        monkeypatch.setattr(sys.modules["landsim.simulate"], "fly", fly)
+        assert landsim("run", "landing") == (130, "", "landsim: interrupted\n")
+
+    def test_a_later_signal_counts_again(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        now = 0.0
+        monkeypatch.setattr("landsim.terminal.time", SimpleNamespace(monotonic=lambda: now))
+        taken = []
+        with pytest.raises(KeyboardInterrupt), terminable():
+            for now in (0.0, 0.5, 2.0, 2.5, 4.0):
+                try:
+                    signal.raise_signal(signal.SIGTERM)
+                except KeyboardInterrupt:
+                    taken.append(now)
+        assert taken == [0.0, 2.0, 4.0]
 
     @pytest.mark.parametrize("command", ["check", "run"])
     def test_a_model_that_jsbsim_refuses(
@@ -280,6 +342,19 @@ class TestFailures:
         code, out, err = landsim("run", "landing", "--out", str(tmp_path / "run"))
         assert (code, out, len(err.splitlines())) == (2, "", 1)
         assert "the working directory is not there any more" in err
+
+    @pytest.mark.parametrize("command", ["run", "check", "batch", "budget"])
+    def test_the_folder_of_a_batch(self, command: str, landsim: Run, tmp_path: Path) -> None:
+        (tmp_path / "day").mkdir()
+        (tmp_path / "day" / "batch.json").write_text("{}")
+        code, out, err = landsim(command, "day")
+        assert (code, out) == (2, "")
+        assert err == f"landsim: day: is the folder of a batch, not a scenario; did you mean day/{SCENARIO_FILE}?\n"
+
+    def test_a_disk_that_is_full_where_nobody_looked(self, landsim: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.fail_with(OSError(errno.ENOSPC, "No space left on device", "cache/x"), monkeypatch)
+        told = "landsim: cache/x: cannot be written: No space left on device\n"
+        assert landsim("run", "landing") == (2, "", told)
 
     def test_plot_of_other_metrics(self, landsim: Run, tmp_path: Path) -> None:
         landsim("run", "landing", "--out", "mine")
@@ -338,8 +413,14 @@ class TestOutput:
     def test_a_terminal_of_ascii(self, tmp_path: Path) -> None:
         code, out, err = self.shell("$RUN", tmp_path, PYTHONIOENCODING="ascii")
         assert (code, err) == (0, b"")
-        assert b"265.2 m" in out
         assert out.isascii()
+        lines = out.decode().splitlines()
+        (bank,) = [line for line in lines if "right of the centreline" in line and "+/-" in line]
+        (sink,) = [line for line in lines if "sink rate" in line]
+        assert "100 ... 450 m" in out.decode()
+        assert "<= 1 m/s" in sink
+        assert len(bank) == len(sink)
+        assert "?" not in out.decode()
 
 
 class TestTables:
@@ -349,6 +430,37 @@ class TestTables:
             for table in flight_tables(metrics, width):
                 console.print(table, crop=False)
         return text.get()
+
+    def test_what_was_not_reached_is_not_out(self) -> None:
+        metrics = as_json(fake_flight().metrics)
+        metrics |= {"touchdown": None, "stop": None, "outcome": "diverged", "reason": "the filter diverged"}
+        metrics["box"] = {key: of | {"value": None, "ok": False} for key, of in metrics["box"].items()}
+        text = self.printed(100, metrics)
+        assert "\u2013  100 … 450 m  not reached" in text
+        assert " out" not in text
+
+    def test_why_a_flight_came_to_nothing(self) -> None:
+        """A batch of one, in the table of the worst."""
+        flight = {"index": 0, "outcome": "error", "in_box": False, "limit": None}
+        for reason, told in (
+            ("took longer than the limit of 60 s of wall time", "time limit"),
+            ("RuntimeError: wings fell off", "RuntimeError: wings fell off"),
+            ("RuntimeError: the wings fell off", "RuntimeError: the wings f..."),
+        ):
+            summary = {
+                "batch": {"scenario": "landing", "n": 1, "seed": 0, "confidence": 0.95},
+                "rates": {"success": {"rate": 0.0, "low": 0.0, "high": 0.975}, "outcomes": []},
+                "distributions": [],
+                "worst": {"flights": [flight | {"reason": reason}]},
+            }
+            console = Console(width=40, file=io.StringIO())
+            with console.capture() as captured:
+                for table in batch_tables(summary, 40):
+                    console.print(table, crop=False)
+            text = captured.get()
+            assert "landing, 1 flight from seed 0 on" in text
+            assert told in text
+            assert max(map(len, text.splitlines())) <= 40
 
     @pytest.mark.parametrize("width", [100, 60, 44, 40])
     def test_nothing_is_cut_at_any_width(self, width: int) -> None:

@@ -387,7 +387,7 @@ class TestCommandLine:
         assert tomllib.loads(out)["study"]["flights"] == 3
 
     def test_an_interrupt_leaves_nothing(self, tmp_path: Path) -> None:
-        """As by Ctrl-C, which the terminal sends to every process: exit code 130, silence, nothing left behind."""
+        """As by Ctrl-C, which the terminal sends to every process: exit code 130, a line, nothing left behind."""
         process = subprocess.Popen(
             [sys.executable, "-c", "from landsim.cli import main; main()", "run", "paper-fig3", "--out", "a/b"],
             cwd=tmp_path,
@@ -403,5 +403,5 @@ class TestCommandLine:
         time.sleep(1.0)
         os.killpg(process.pid, signal.SIGINT)
         out, err = process.communicate(timeout=60)
-        assert (process.returncode, out, err.strip()) == (130, b"", b"")
+        assert (process.returncode, out, err.strip()) == (130, b"", b"landsim: interrupted")
         assert list(tmp_path.iterdir()) == []

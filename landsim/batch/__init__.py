@@ -8,9 +8,11 @@
     cluster              the same on Dask
     job, engine          one flight to do; flights through any executor, a bounded number at a time
     identity             what makes two batches the same
+    deferred             interrupts that wait until nothing is held
     chunks, gather       results as they come, and all of them in order; durable writes what must not be lost
     folder               a batch's folder: begun, resumed, finished
     merge, replay        shards to one batch; one flight again
+    verify               a table of flights against the batch that it is said to be of
     flights              the flights of a batch as columns
     measures, published  what a flight is judged by; published limits, with sources
     stats, ellipse       intervals, bounds, rank correlation; where the next touchdown will be

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landsim.batch.durable import clear_partial
-from landsim.batch.row import ARRAYS, SCALARS, Row
-from landsim.batch.rows import rows_of, save_rows
+from landsim.batch.row import Row
+from landsim.batch.rows import check_columns, rows_of, save_rows
 from landsim.errors import RunFolderError
 
 DAMAGED = ".damaged"
@@ -20,6 +20,10 @@ DAMAGED = ".damaged"
 
 class BatchStopped(Exception):
     """A batch cannot go on; what is on the disk already stays, and can be resumed.  ``str()`` of it is one line."""
+
+
+class NotWrittenError(BatchStopped):
+    """A batch cannot go on because of its folder's place: a full disk, no right to write."""
 
 
 class Chunks:
@@ -64,7 +68,7 @@ class Chunks:
 
         Raises
         ------
-        BatchStopped
+        NotWrittenError
             If it cannot be written.
         """
         position = self._position(row["index"])
@@ -105,7 +109,7 @@ class Chunks:
             for stale in self._stale.pop(block, set()) - {path}:
                 stale.unlink(missing_ok=True)
         except OSError as error:
-            raise BatchStopped(f"{path}: cannot be written: {error.strerror or error}") from None
+            raise NotWrittenError(f"{path}: cannot be written: {error.strerror or error}") from None
         del self._open[block]
 
     def _take(self, path: Path) -> None:
@@ -150,8 +154,9 @@ def _verified(path: Path) -> Any:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    with suppress(OSError, pa.ArrowException), path.open("rb") as file:
+    with suppress(OSError, pa.ArrowException, RunFolderError), path.open("rb") as file:
         table = pq.read_table(file, page_checksum_verification=True)
-        if {*SCALARS, *ARRAYS} <= set(table.column_names) and table["index"].null_count == 0:
+        check_columns(table.schema, path)
+        if table["index"].null_count == 0 and len(table["index"].unique()) == table.num_rows:
             return table
     raise _DamagedError

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 
-from landsim.batch.chunks import BatchStopped
+from landsim.batch.chunks import BatchStopped, NotWrittenError
+from landsim.batch.deferred import uninterrupted
 from landsim.batch.folder import BatchFolder
 from landsim.batch.job import Job, Keeper, KeepError, fly_job, jobs_of, lost_job, warm_up
 from landsim.batch.pool import workers
@@ -43,7 +44,7 @@ def on_processes(count: int, time_limit: float) -> Iterator[Engine]:
 
 
 PATIENCE_S = 1.0
-"""How often to look whether an executor can still fly."""
+"""How often to look whether an executor can still fly, and the longest that an interrupt waits."""
 
 
 def rows_of_jobs(
@@ -75,21 +76,22 @@ def rows_of_jobs(
     flying: dict[Future[Row], Job] = {}
     try:
         while True:
-            for job in islice(todo, engine.window - len(flying)):
-                flying[engine.executor.submit(fly, job)] = job
-            if not flying:
+            with uninterrupted():
+                for job in islice(todo, engine.window - len(flying)):
+                    flying[engine.executor.submit(fly, job)] = job
+                done = wait(flying, timeout=PATIENCE_S, return_when=FIRST_COMPLETED).done if flying else set()
+                rows = [_row(future, flying.pop(future), lost) for future in done]
+            yield from rows
+            if not flying and not rows:
                 return
-            done = wait(flying, timeout=PATIENCE_S, return_when=FIRST_COMPLETED).done
-            if not done and engine.check is not None:
+            if not rows and engine.check is not None:
                 engine.check()
-            for future in done:
-                job = flying.pop(future)
-                yield _row(future, job, lost)
     except (BrokenExecutor, CancelledError) as failure:
         raise BatchStopped(str(failure) or "who was to fly has dropped the flights") from None
     finally:
-        for future in flying:
-            future.cancel()
+        with uninterrupted():
+            for future in flying:
+                future.cancel()
 
 
 def _row(future: "Future[Row]", job: Job, lost: Callable[[Job, str, str | None], Row]) -> Row:
@@ -98,7 +100,7 @@ def _row(future: "Future[Row]", job: Job, lost: Callable[[Job, str, str | None],
     except (BrokenExecutor, CancelledError):
         raise
     except KeepError as failure:
-        raise BatchStopped(f"flight {job.index} cannot be kept: {failure}") from None
+        raise NotWrittenError(f"flight {job.index} cannot be kept: {failure}") from None
     except Exception as failure:  # noqa: BLE001 - one flight must not take the others with it, and its row says why
         return lost(job, *reason_of(failure))
 

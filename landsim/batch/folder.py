@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from landsim.batch.chunks import BatchStopped, Chunks
+from landsim.batch.chunks import Chunks, NotWrittenError
 from landsim.batch.durable import PARTIAL, clear_partial, write_json, write_text
 from landsim.batch.gather import gather
 from landsim.batch.identity import (
@@ -28,9 +28,11 @@ from landsim.batch.identity import (
     differing_key,
     differing_version,
     digest,
+    flights,
     read_identity,
 )
 from landsim.batch.row import Row
+from landsim.batch.verify import check_flights
 from landsim.config import Scenario, load_scenario, resolved_toml
 from landsim.errors import RunFolderError, is_text, one_line
 from landsim.parquet import read_table
@@ -72,7 +74,7 @@ class BatchFolder:
         return int(self.chunks.there.sum())
 
     def add(self, row: Row) -> None:
-        """Take the row of a flight; raises BatchStopped if it cannot be written."""
+        """Take the row of a flight; raises NotWrittenError if it cannot be written."""
         self.chunks.add(row)
 
     def finish(self) -> Path:
@@ -82,7 +84,7 @@ class BatchFolder:
         ------
         RunFolderError
             If some are missing.
-        BatchStopped
+        NotWrittenError
             If it cannot be written.
         """
         path = self.path / FLIGHTS_FILE
@@ -93,7 +95,7 @@ class BatchFolder:
                 gather(sources, path, self.identity.indices())
             shutil.rmtree(self.path / CHUNKS, ignore_errors=True)
         except OSError as error:
-            raise BatchStopped(f"{path}: cannot be written: {error.strerror or error}") from None
+            raise NotWrittenError(f"{path}: cannot be written: {error.strerror or error}") from None
         return path
 
 
@@ -115,13 +117,19 @@ def check_new(path: Path) -> None:
 
 
 def check_same(path: Path, scenario: Scenario, wanted: Identity) -> None:
-    """RunFolderError if what is wanted is not the batch that a folder holds; it may have more flights than that."""
+    """RunFolderError if what is wanted is not the batch that a folder holds; it may have more flights than that.
+
+    ScenarioError if the scenario that the folder holds cannot be read any more.
+    """
     stored = read_identity(path)
+    _stored_toml(path)
     if stored.scenario != wanted.scenario:
         raise RunFolderError(f"{path}: holds a batch of {stored.scenario}, not of {wanted.scenario}")
     text = resolved_toml(scenario)
     if digest(text) != stored.scenario_digest:
-        raise RunFolderError(f"{path}: was begun with another scenario: {differing_key(_stored_toml(path), text)}")
+        there = resolved_toml(_stored_scenario(path, stored))
+        raise RunFolderError(f"{path}: was begun with another scenario: {differing_key(there, text)}")
+    _stored_scenario(path, stored, text)
     if wanted.aircraft_digest != stored.aircraft_digest:
         raise RunFolderError(f"{path}: was begun with another aircraft: its files have changed since")
     differs = differing_version(stored.versions, wanted.versions)
@@ -132,10 +140,10 @@ def check_same(path: Path, scenario: Scenario, wanted: Identity) -> None:
         if there != here:
             raise RunFolderError(f"{path}: was begun with another {name}: {there} there and {here} here")
     if wanted.n < stored.n:
-        raise RunFolderError(f"{path}: holds a batch of {stored.n} flights, which is more than {wanted.n}")
+        raise RunFolderError(f"{path}: holds a batch of {flights(stored.n)}, which is more than {wanted.n}")
     if wanted.n != stored.n and stored.sampling == "latin-hypercube":
         raise RunFolderError(
-            f"{path}: holds a Latin hypercube of {stored.n} flights, which cannot grow to {wanted.n}: every draw of it"
+            f"{path}: holds a Latin hypercube of {flights(stored.n)}, which cannot grow to {wanted.n}: every draw of it"
             f" depends on their number"
         )
 
@@ -179,7 +187,7 @@ def open_batch(path: Path, scenario: Scenario, identity: Identity, *, resume: bo
         try:
             yield folder
         except BaseException:
-            with suppress(BatchStopped):
+            with suppress(NotWrittenError):
                 folder.chunks.flush()
             raise
 
@@ -215,10 +223,19 @@ def load_batch(path: Path) -> tuple[Scenario, Identity]:
     """
     identity = read_identity(path)
     _stored_toml(path)
+    return _stored_scenario(path, identity), identity
+
+
+def _stored_scenario(path: Path, identity: Identity, original: str | None = None) -> Scenario:
+    """The scenario that a folder holds, if it is still the one that the batch was begun with, ``original`` as TOML."""
     scenario = load_scenario(path / SCENARIO_FILE).model_copy(update={"name": identity.scenario})
-    if digest(resolved_toml(scenario)) != identity.scenario_digest:
-        raise RunFolderError(f"{path / SCENARIO_FILE}: is not the scenario that the batch was flown with")
-    return scenario, identity
+    text = resolved_toml(scenario)
+    if digest(text) != identity.scenario_digest:
+        differs = "" if original is None else f": {differing_key(text, original)}"
+        raise RunFolderError(
+            f"{path / SCENARIO_FILE}: is not the scenario that the batch was flown with{differs}; put back what it was"
+        )
+    return scenario
 
 
 def _stored_toml(path: Path) -> str:
@@ -233,12 +250,11 @@ def _stored_toml(path: Path) -> str:
 def _finished(path: Path, identity: Identity) -> NDArray[np.bool_]:
     """Which flights are in the table of all that had been asked for when it was written."""
     there = np.zeros(len(identity.indices()), dtype=bool)
-    flights = path / FLIGHTS_FILE
-    if flights.is_file():
+    table = path / FLIGHTS_FILE
+    if table.is_file():
+        check_flights(table, identity)
         indices = identity.indices()
-        for index in read_table(flights, ["index"])["index"].to_pylist():
-            if index not in indices:
-                raise RunFolderError(f"{flights}: holds flight {index}, which does not belong to the batch")
+        for index in read_table(table, ["index"])["index"].to_pylist():
             there[indices.index(index)] = True
     return there
 
@@ -251,6 +267,6 @@ def _head(scenario: Scenario, identity: Identity) -> str:
     shard = "" if identity.shard.of == 1 else f" --shard {identity.shard}"
     again = f"landsim batch {SCENARIO_FILE} -n {identity.n} --seed {identity.seed}{shard}"
     return (
-        f"# {one_line(scenario.name)}, resolved: every key as it was flown, {identity.n} flights from seed"
+        f"# {one_line(scenario.name)}, resolved: every key as it was flown, {flights(identity.n)} from seed"
         f" {identity.seed} on.\n# The same batch again: {again}\n"
     )

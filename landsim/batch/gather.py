@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from landsim.batch.durable import replacing
-from landsim.batch.rows import HOW
+from landsim.batch.rows import HOW, check_columns
 from landsim.errors import RunFolderError
 
 if TYPE_CHECKING:
@@ -62,6 +62,8 @@ def gather(sources: Sequence[Path], to: Path, indices: range) -> None:
             except pa.ArrowException:
                 raise RunFolderError(f"{path}: cannot be read: not a Parquet file") from None
         schemas = [file.schema_arrow for file in files]
+        for path, schema in zip(sources[:1], schemas, strict=False):  # the others must be the same
+            check_columns(schema, path)
         for path, schema in zip(sources, schemas, strict=True):
             if not schema.equals(schemas[0]):
                 raise RunFolderError(f"{path}: has not the columns of {sources[0]}")
@@ -86,7 +88,8 @@ def _placed(sources: Sequence[Path], files: Sequence[Any], indices: range) -> _P
     if twice.size:
         at = int(twice[0])
         one, other = (sources[place.source[i]] for i in (at, at + 1))
-        raise RunFolderError(f"flight {place.flight[at]} is in {one} and in {other}")
+        where = f"in {one} and in {other}" if one != other else f"in {one} twice"
+        raise RunFolderError(f"flight {place.flight[at]} is {where}")
     wanted = np.arange(indices.start, indices.stop, indices.step)
     strange = np.setdiff1d(place.flight, wanted)
     if strange.size:
@@ -94,7 +97,8 @@ def _placed(sources: Sequence[Path], files: Sequence[Any], indices: range) -> _P
         raise RunFolderError(f"{where}: holds flight {strange[0]}, which does not belong to the batch")
     missing = np.setdiff1d(wanted, place.flight)
     if missing.size:
-        raise RunFolderError(f"{missing.size} of {wanted.size} flights are missing: {listed(missing.tolist())}")
+        verb = "is" if missing.size == 1 else "are"
+        raise RunFolderError(f"{missing.size} of {wanted.size} flights {verb} missing: {listed(missing.tolist())}")
     return place
 
 

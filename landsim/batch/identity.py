@@ -96,6 +96,11 @@ class Identity:
         return {"format": FORMAT, **asdict(self), "shard": str(self.shard)}
 
 
+def flights(n: int) -> str:
+    """So many flights, in words."""
+    return f"{n} flight{'' if n == 1 else 's'}"
+
+
 def identify(
     scenario: Scenario, n: int, seed: int, shard: Shard, keep: Keep, time_limit_s: float, chunk: int
 ) -> Identity:
@@ -111,7 +116,7 @@ def identify(
     if not 1 <= n <= MOST_FLIGHTS:
         raise InputError(f"n: must be 1 to {MOST_FLIGHTS}, not {shown(n)}")
     if not 0 <= seed <= LARGEST_SEED - n:
-        raise InputError(f"seed: must leave room below 2**63 for {n} flights, not {shown(seed)}")
+        raise InputError(f"seed: must leave room below 2**63 for {flights(n)}, not {shown(seed)}")
     if shard.number > n:
         raise InputError(f"shard: {shard} has no flight in a batch of {n}")
     if not 0.0 < time_limit_s <= 1e6:

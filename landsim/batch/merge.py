@@ -1,15 +1,18 @@
 """The shards of a batch to one batch."""
 
+import os
 import shutil
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from landsim.batch.chunks import BatchStopped
+from landsim.batch.chunks import NotWrittenError
 from landsim.batch.folder import FLIGHTS_FILE, KEPT, BatchFolder, load_batch, locked
 from landsim.batch.gather import gather
-from landsim.batch.identity import Identity, Shard, differing_version
+from landsim.batch.identity import Identity, Shard, differing_version, flights
+from landsim.batch.verify import check_flights
 from landsim.config import Scenario
+from landsim.dispersion import keys_of
 from landsim.errors import InputError, RunFolderError
 
 
@@ -19,8 +22,11 @@ def check_shards(folders: Sequence[Path]) -> tuple[Scenario, Identity]:
     Raises
     ------
     RunFolderError
-        If a folder holds no finished shard, or they are not all the shards of one batch.
+        If a folder holds no finished shard or is named twice, or they are not all the shards of one batch.
+    InputError
+        If shards are missing.
     """
+    _must_differ(folders)
     loaded = [load_batch(folder) for folder in folders]
     scenario, first = loaded[0]
     for folder, (_, identity) in zip(folders, loaded, strict=True):
@@ -35,6 +41,8 @@ def check_shards(folders: Sequence[Path]) -> tuple[Scenario, Identity]:
             raise RunFolderError(f"{folder}: was flown with other versions than {folders[0]}: {differs}")
         if identity.shard.of != first.shard.of:
             raise RunFolderError(f"{folder}: is shard {identity.shard}, but {folders[0]} is {first.shard}")
+    if first.shard.of == 1:
+        raise RunFolderError(f"{folders[0]}: is a whole batch, not a shard of one: there is nothing to merge")
     shards = [identity.shard for _, identity in loaded]
     for i, shard in enumerate(shards):
         if shard in shards[:i]:
@@ -43,18 +51,31 @@ def check_shards(folders: Sequence[Path]) -> tuple[Scenario, Identity]:
     missing = [str(Shard(number, first.shard.of)) for number in range(1, first.shard.of + 1) if number not in there_are]
     if missing:
         named = ", ".join(missing[:5]) + (f" and {len(missing) - 5} more" if len(missing) > 5 else "")
-        raise InputError(f"shard {named} is missing: a batch is merged from all of its shards")
+        have = f"{folders[0]} is shard {shards[0]} alone" if len(shards) == 1 else f"there are {len(shards)}"
+        lacks = f"shard {named} of the batch is" if len(missing) == 1 else f"shards {named} of the batch are"
+        raise InputError(f"{have}: {lacks} missing; name the folders of all of them")
     for folder, (_, identity) in zip(folders, loaded, strict=True):
-        _check_finished(folder, identity)
+        _check_finished(folder, scenario, identity)
     return scenario, replace(first, shard=Shard())
 
 
-def _check_finished(folder: Path, identity: Identity) -> None:
+def _must_differ(folders: Sequence[Path]) -> None:
+    places = [os.path.realpath(folder) for folder in folders]
+    for i, place in enumerate(places):
+        if place in places[:i]:
+            raise RunFolderError(f"{folders[i]}: is named twice; name each shard's folder once")
+
+
+def _check_finished(folder: Path, scenario: Scenario, identity: Identity) -> None:
+    n = len(identity.indices())
     if (folder / FLIGHTS_FILE).is_file():
-        return
-    with locked(folder):
-        done, n = BatchFolder(folder, identity).done, len(identity.indices())
-    raise RunFolderError(f"{folder}: {n - done} of its {n} flights are missing; --resume flies them")
+        done = check_flights(folder / FLIGHTS_FILE, identity, keys_of(scenario))
+    else:
+        with locked(folder):
+            done = BatchFolder(folder, identity).done
+    if done < n:
+        missing = f"{n - done} of its {flights(n)} {'is' if n - done == 1 else 'are'} missing"
+        raise RunFolderError(f"{folder}: {missing}; --resume flies {'it' if n - done == 1 else 'them'}")
 
 
 def merge(folders: Sequence[Path], to: BatchFolder) -> Path:
@@ -76,7 +97,7 @@ def merge(folders: Sequence[Path], to: BatchFolder) -> Path:
     ------
     RunFolderError
         If a shard's table cannot be read, or flights are missing.
-    BatchStopped
+    NotWrittenError
         If the table cannot be written.
     """
     path = to.path / FLIGHTS_FILE
@@ -86,5 +107,5 @@ def merge(folders: Sequence[Path], to: BatchFolder) -> Path:
             if (folder / KEPT).is_dir():
                 shutil.copytree(folder / KEPT, to.path / KEPT, dirs_exist_ok=True)
     except OSError as error:
-        raise BatchStopped(f"{path}: cannot be written: {error.strerror or error}") from None
+        raise NotWrittenError(f"{path}: cannot be written: {error.strerror or error}") from None
     return path

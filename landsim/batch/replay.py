@@ -6,10 +6,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from landsim.batch.folder import CHUNKS, FLIGHTS_FILE, load_batch
-from landsim.batch.identity import Identity
+from landsim.batch.identity import Identity, flights
 from landsim.batch.job import Job
 from landsim.batch.row import DRAW, Row, flight_row
 from landsim.batch.rows import rows_of
+from landsim.batch.verify import check_flights
 from landsim.config import Scenario
 from landsim.dispersion import keys_of
 from landsim.errors import RunFolderError
@@ -49,20 +50,22 @@ def find_flight(folder: Path, index: int) -> Recorded:
     scenario, identity = load_batch(folder)
     if index not in identity.indices():
         of = "" if identity.shard.of == 1 else f" shard {identity.shard} of"
-        raise RunFolderError(f"{folder}: holds{of} a batch of {identity.n} flights, 0 to {identity.n - 1}, not {index}")
-    row = _find(folder, index)
+        there = f"{flights(identity.n)}, {'0' if identity.n == 1 else f'0 to {identity.n - 1}'}"
+        raise RunFolderError(f"{folder}: holds{of} a batch of {there}, not {index}")
+    row = _find(folder, index, scenario, identity)
     if row is None:
         raise RunFolderError(f"{folder}: flight {index} has not been flown yet")
     draws = {key: row[f"{DRAW}{key}"] for key in keys_of(scenario)}
     return Recorded(scenario, identity, Job(index, row["seed"], draws), row)
 
 
-def _find(folder: Path, index: int) -> Row | None:
+def _find(folder: Path, index: int, scenario: Scenario, identity: Identity) -> Row | None:
     import pyarrow.parquet as pq
 
     for path in (folder / FLIGHTS_FILE, *sorted((folder / CHUNKS).glob("*.parquet"))):
         if not path.is_file():
             continue
+        check_flights(path, identity, keys_of(scenario))
         at = np.flatnonzero(read_table(path, ["index"])["index"].to_numpy() == index)
         if not at.size:
             continue

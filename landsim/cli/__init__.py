@@ -1,8 +1,8 @@
 """The command line: the only place that parses arguments and prints.
 
-Exit codes: 0, it ran, whatever the landing was and whoever reads of it; 2, bad input or usage, told in one line on
-stderr, nothing written; 1, a failure of landsim's own; 130, interrupted or terminated.  Heavy libraries are imported by
-the commands that need them.
+Exit codes: 0, it ran, whatever the landing was and whoever reads of it; 2, bad input or usage, or a place that cannot
+be written, told in one line on stderr; 1, a failure of landsim's own; 130, interrupted or terminated, told in a line
+as well.  Heavy libraries are imported by the commands that need them.
 
 ::
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from landsim.cli.common import echo_paths, overrides, seed_of, set_option, write_text
+from landsim.cli.common import echo_paths, overrides, refuse_batch, seed_of, set_option, write_text
 from landsim.terminal import print_tables, printing, progress_bar, shown, status
 
 if TYPE_CHECKING:
@@ -86,6 +86,7 @@ def budget(
     from landsim.budget.order import order_of
     from landsim.runs import load_flight
 
+    refuse_batch(scenario)
     loaded, _ = load_flight(scenario, overrides(settings))
     order = order_of(
         required=required,

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from landsim.log import Log
 
 SEED_DIGITS = 1000
+BATCH_FILE = "batch.json"
+"""As in `landsim.batch.identity`, which is not imported for its name: whoever checks a scenario would wait for it."""
 
 set_option = click.option(
     "--set",
@@ -37,6 +39,15 @@ def whole(context: click.Context, option: click.Parameter, value: str | None) ->
     return seed_of(context, option, value)
 
 
+def positive(context: click.Context, option: click.Parameter, value: str | None) -> int | None:
+    """A whole number, one or more, in decimal digits."""
+    if value is None:
+        return None
+    if not (value.isascii() and value.isdigit() and len(value) <= SEED_DIGITS and int(value) >= 1):
+        raise click.BadParameter(f"must be a whole number, 1 or more, not {value or 'nothing'}", context, option)
+    return int(value)
+
+
 def load(scenario: str, settings: tuple[str, ...]) -> "tuple[Scenario, int | None]":
     """The scenario, its aircraft found to load into JSBSim, and the seed if it is that of a run."""
     from landsim.dispersion import loading_to_offer
@@ -49,6 +60,7 @@ def load(scenario: str, settings: tuple[str, ...]) -> "tuple[Scenario, int | Non
         Path.cwd()
     except OSError:  # JSBSim asks for it
         raise InputError("the working directory is not there any more; change to another") from None
+    refuse_batch(scenario)
     loaded, seed = load_flight(scenario, overrides(settings))
     aircraft, runway = loaded.aircraft_config, Runway(length=loaded.runway.length_m, width=loaded.runway.width_m)
     Plant(aircraft.folder, aircraft.model, runway, loaded.simulation.rate_hz, loading_to_offer(loaded))
@@ -57,6 +69,20 @@ def load(scenario: str, settings: tuple[str, ...]) -> "tuple[Scenario, int | Non
 
         must_have_plug_ins(loaded)
     return loaded, seed
+
+
+def refuse_batch(scenario: str) -> None:
+    """InputError if what should be a scenario is the folder of a batch, which has one but is none."""
+    from landsim.errors import InputError
+    from landsim.resources import shipped_scenarios
+
+    try:
+        batch = scenario not in shipped_scenarios() and (Path(scenario) / BATCH_FILE).is_file()
+    except OSError:  # a name too long
+        return
+    if scenario and batch:
+        told = f"is the folder of a batch, not a scenario; did you mean {Path(scenario) / 'scenario.toml'}?"
+        raise InputError(f"{scenario}: {told}")
 
 
 def overrides(settings: tuple[str, ...]) -> dict[str, object]:

@@ -1,11 +1,13 @@
 """Batches side by side: compare."""
 
+import os
 from pathlib import Path
 
 import click
 
 from landsim.cli.common import echo_paths
-from landsim.terminal import print_tables, printing, shown, status
+from landsim.cli.finish import flights_there, missing_flights
+from landsim.terminal import print_tables, printing, shown, status, tell
 
 COMPARE_FILE = "compare.json"
 
@@ -20,7 +22,11 @@ COMPARE_FILE = "compare.json"
 )
 @click.option("--no-report", is_flag=True, help="Draw no figures and write no page.")
 def compare(folders: tuple[Path, ...], out: Path | None, no_report: bool) -> None:
-    """Tell how the batches in two DIRs or more differ: each other with the first, over the seeds that both flew."""
+    """Tell how the batches in two DIRs or more differ: each other with the first, over the seeds that both flew.
+
+    A difference is the other less the first: above zero where the other has more.  Tables are printed; the numbers
+    (compare.json), the page (compare.html) and the figures go to a new folder, --out, and none to the batches' own.
+    """
     from landsim.batch.compare import Batch
     from landsim.batch.compare import compare as compared_of
     from landsim.batch.durable import write_json
@@ -30,11 +36,14 @@ def compare(folders: tuple[Path, ...], out: Path | None, no_report: bool) -> Non
     from landsim.runs import new_run
     from landsim.tables import compare_tables
 
+    _must_differ(folders)
     batches = []
+    incomplete = []
     for folder, name in zip(folders, _names(folders), strict=True):
-        scenario, _ = load_batch(folder)
-        if not (folder / FLIGHTS_FILE).is_file():
-            raise RunFolderError(f"{folder}: the batch is not finished; landsim batch --resume goes on with it")
+        scenario, identity = load_batch(folder)
+        there = flights_there(folder, scenario, identity)
+        if there < len(identity.indices()):
+            incomplete.append(missing_flights(folder, there, identity))
         batches.append(Batch(name, scenario, load_flights(folder / FLIGHTS_FILE)))
     with new_run("compare", out) as place:
         with status("comparing") as say:
@@ -49,6 +58,8 @@ def compare(folders: tuple[Path, ...], out: Path | None, no_report: bool) -> Non
             except OSError as error:
                 raise RunFolderError(f"{place.final}: cannot be written: {error.strerror}") from None
         names = sorted(path.name for path in place.temporary.iterdir())
+    for line in incomplete:
+        tell(line)
     with printing(f"{shown(place.final)}: the comparison is there"):
         click.echo(shown(place.final))
         print_tables(lambda width: compare_tables(compared, width))
@@ -56,9 +67,18 @@ def compare(folders: tuple[Path, ...], out: Path | None, no_report: bool) -> Non
         echo_paths(place.final, names)
 
 
+def _must_differ(folders: tuple[Path, ...]) -> None:
+    from landsim.errors import InputError
+
+    places = [os.path.realpath(folder) for folder in folders]
+    for i, place in enumerate(places):
+        if place in places[:i]:
+            raise InputError(f"{folders[i]}: is named twice; a batch is compared with others, not with itself")
+
+
 def _names(folders: tuple[Path, ...]) -> list[str]:
     """What to call the batches: their folders' names, with as much of what is above as tells them apart."""
-    paths = [folder.expanduser().resolve() for folder in folders]
+    paths = [Path(os.path.realpath(folder)) for folder in folders]
     for parts in range(1, max(len(path.parts) for path in paths) + 1):
         names = ["/".join(path.parts[-parts:]) for path in paths]
         if len(set(names)) == len(names):

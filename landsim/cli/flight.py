@@ -43,7 +43,8 @@ def list_command() -> None:
 def check(scenario: str, settings: tuple[str, ...]) -> None:
     """Validate SCENARIO, load its aircraft into JSBSim, and print the scenario with every key.
 
-    What is printed is a TOML file of the same flight.
+    What is printed is a TOML file of the same flight, after what each dispersion draws.  Every number outside [box] can
+    be drawn; a distribution that may draw what its key must not be is refused.
     """
     from landsim.config import resolved_toml
     from landsim.dispersion import described
