@@ -1,7 +1,7 @@
 """What is known on board: measurements, the navigation state, the command.  Nothing here is true by construction."""
 
 import math
-from enum import IntEnum
+from enum import IntEnum, IntFlag
 from typing import NamedTuple, TypeAlias
 
 from estimator.so3 import Array, Mat3, Vec3
@@ -16,6 +16,8 @@ class Phase(IntEnum):
     FLARE = 2
     ROLLOUT = 3
     STOPPED = 4
+    GO_AROUND = 5
+    """The landing was given up: climbing out on the runway's heading."""
 
 
 class Stage(IntEnum):
@@ -27,6 +29,18 @@ class Stage(IntEnum):
     """Both edges and the threshold: six numbers."""
     LATE = 2
     """Both edges: four numbers, with the filter's roll."""
+
+
+class Alarm(IntFlag):
+    """What navigation finds wrong with itself; several may stand at once."""
+
+    NONE = 0
+    WRONG_LINE = 1
+    """A line has disagreed with all else for so long that it is taken for another and left out."""
+    UNAIDED = 2
+    """No line has been believed for longer than allowed."""
+    INCONSISTENT = 4
+    """So much disagrees that it may be the state that is wrong."""
 
 
 ImuSample: TypeAlias = Array
@@ -85,6 +99,11 @@ class NavState(NamedTuple):
     airspeed: float
     """From the pitot tube, m/s."""
     stage: Stage
+    lateral_protection: float = math.nan
+    """Of the midpoint of the main wheels, m: what its lateral error exceeds with no more than the stated risk; NaN
+    where navigation states none."""
+    vertical_protection: float = math.nan
+    alarm: Alarm = Alarm.NONE
 
 
 class Command(NamedTuple):
