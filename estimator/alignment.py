@@ -123,6 +123,48 @@ class Alignment:
         spread[ACCEL_BIAS, 12:] = np.eye(3)
         return Start(state, spread @ source @ spread.T)
 
+    def start_of_lines(
+        self, airspeed: float, lines: Array, variance: Array, calibration: Array, noise: ImuNoise
+    ) -> Start:
+        """As `start`, with the camera's calibration in the covariance, which is (23, 23).
+
+        The calibration's errors are the same in all frames, so they do not average out, and the pose that they falsify
+        is correlated with them.
+
+        Parameters
+        ----------
+        airspeed : float
+            m/s.
+        lines : (6, 23) array
+            H of `estimator.single_lines.line_residuals` at `mean`, of all three lines.
+        variance : (6, 6) array
+            Of one frame's residuals.
+        calibration : (8,) array
+            Standard deviations of the calibration's constants.
+        noise : ImuNoise
+        """
+        state = self.mean(airspeed)
+        size = lines.shape[1]
+        constants = slice(strapdown.STATES, size)
+        pose = np.linalg.inv(lines[:, [0, 1, 2, 6, 7, 8]])  # δ of the body's pose by the residuals
+        falsified = -pose @ lines[:, constants] * calibration
+        body = pose @ variance @ pose.T / len(self._shifts)
+        body[:3, :3] += np.eye(3) * (0.5 * self._speed_sigma * self._time) ** 2
+        body[3:, 3:] += np.eye(3) * (noise.gyro**2 * self._time + (noise.gyro_bias * self._time) ** 2)
+        body += falsified @ falsified.T
+        spread = np.zeros((size, 6))
+        spread[POSITION, :3] = np.eye(3)
+        spread[ATTITUDE, 3:] = np.eye(3)
+        spread[VELOCITY, 3:] = -_cross(state.velocity)
+        covariance = spread @ body @ spread.T
+        covariance[VELOCITY, VELOCITY] += np.eye(3) * self._speed_sigma**2
+        covariance[GYRO_BIAS, GYRO_BIAS] = np.eye(3) * noise.gyro_bias**2
+        covariance[ACCEL_BIAS, ACCEL_BIAS] = np.eye(3) * noise.accel_bias**2
+        covariance[:, constants] = spread @ falsified * calibration
+        covariance[constants, :] = covariance[:, constants].T
+        covariance[constants, constants] = np.diag(calibration**2)
+        return Start(state, covariance)
+
 
 _NO_BIAS = np.zeros(6)
 

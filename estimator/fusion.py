@@ -144,12 +144,15 @@ class InertialVisionFilter:
         self.nominal = start.state.numbers()
         self.bias = np.zeros(6)
         self._rows = rows(strapdown.NOMINAL)
-        self._ekf = _ErrorFilter(dim_x=strapdown.STATES, dim_z=6)
-        self._zero = np.zeros(strapdown.STATES)
+        size = len(start.covariance)
+        self._ekf = _ErrorFilter(dim_x=size, dim_z=6)
+        self._zero = np.zeros(size)
         self._ekf.x = self._zero
         self._ekf.P = start.covariance.copy()
         self._noise_dt = 0.0
         self._elapsed = 0.0
+
+    _predicted = staticmethod(predicted)
 
     @property
     def state(self) -> Inertial:
@@ -183,7 +186,7 @@ class InertialVisionFilter:
         if abs(dt - self._noise_dt) > 1e-9:
             self._noise_dt = dt
             ekf.Q = strapdown.process_noise(self._noise, dt)
-        self.nominal, ekf.P = predicted(self.nominal, ekf.P, ekf.Q, dt)
+        self.nominal, ekf.P = self._predicted(self.nominal, ekf.P, ekf.Q, dt)
         self._elapsed = 0.0
 
     def observe(self, lines: Array, tilt: float) -> Update:
@@ -213,11 +216,9 @@ class InertialVisionFilter:
             Largest normalised innovation squared that is believed.
         """
         ekf = self._ekf
-        y, H, ekf.R = innovation
-        before = ekf.P
-        # z and Hx are those of an error of zero: the innovation stands for their difference
-        ekf.update(0.0, lambda _: H, _no_error, residual=lambda _z, _hx: y)
-        nis, nominal, bias = _taken_in(y, ekf.SI, ekf.x, self.nominal, self.bias)
+        y, before = innovation.y, ekf.P
+        self._correct(innovation)
+        nis, nominal, bias = taken_in(y, ekf.SI, ekf.x, self.nominal, self.bias)
         ekf.x = self._zero
         if not nis <= gate:
             ekf.P = before
@@ -225,15 +226,21 @@ class InertialVisionFilter:
         self.nominal, self.bias = nominal, bias
         return Update(len(y), nis, True)
 
+    def _correct(self, innovation: Innovation) -> None:
+        """Filterpy's update of the error, which was zero, and of its covariance."""
+        y, H, self._ekf.R = innovation
+        # z and Hx are those of an error of zero: the innovation stands for their difference
+        self._ekf.update(0.0, lambda _: H, _no_error, residual=lambda _z, _hx: y)
+
 
 @compiled
-def _taken_in(y: Array, SI: Array, error: Array, nominal: Array, bias: Array) -> tuple[float, Array, Array]:
+def taken_in(y: Array, SI: Array, error: Array, nominal: Array, bias: Array) -> tuple[float, Array, Array]:
     """The normalised innovation squared, and the nominal state (18,) and the biases (6,) with the error taken in."""
     nis = 0.0
     for i in range(len(y)):
         for j in range(len(y)):
             nis += y[i] * SI[i, j] * y[j]
-    return nis, corrected(nominal, error), bias + error[9:]
+    return nis, corrected(nominal, error), bias + error[9:15]
 
 
 def _no_error(_: Array) -> float:

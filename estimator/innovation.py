@@ -234,7 +234,8 @@ def camera_sigma(covariance: Array, attitude: Array, mount: Mount, tilt: Array) 
 
     Parameters
     ----------
-    covariance : (n, 15, 15) array
+    covariance : (n, 15, 15) or (n, 23, 23) array
+        The latter with the camera's calibration, as `estimator.single_lines`: how it sits on its mount turns it.
     attitude : (n, 3, 3) array
         R_runway_from_body.
     mount : Mount
@@ -246,13 +247,14 @@ def camera_sigma(covariance: Array, attitude: Array, mount: Mount, tilt: Array) 
     (n, 6) array
         x, y, z (m), roll, pitch and yaw (rad) of the camera triad in the runway frame.
     """
-    forward = camera_triads(attitude, tilt)[:, :, 0]
+    triad = camera_triads(attitude, tilt)
+    forward = triad[:, :, 0]
     level = np.hypot(forward[:, 0], forward[:, 1])
     ahead = forward / level[:, None]
     rise = -ahead[:, 2]
     arm = attitude @ np.array(mount.lever)
     zero, one = np.zeros_like(level), np.ones_like(level)
-    derivative = np.zeros((len(level), 6, STATES))
+    derivative = np.zeros((len(level), 6, covariance.shape[-1]))
     derivative[:, :3, POSITION] = np.eye(3)
     x, y, z = arm.T
     derivative[:, :3, ATTITUDE] = np.stack((zero, z, -y, -z, zero, x, y, -x, zero), axis=-1).reshape(-1, 3, 3)
@@ -260,7 +262,11 @@ def camera_sigma(covariance: Array, attitude: Array, mount: Mount, tilt: Array) 
     u, v, _ = ahead.T
     angles = (u / level, v / level, zero, -v, u, zero, rise * u, rise * v, one)
     derivative[:, 3:, ATTITUDE] = np.stack(angles, axis=-1).reshape(-1, 3, 3)
+    by_turn = derivative[:, 3:, ATTITUDE]
+    if covariance.shape[-1] > STATES:  # lower by a turn against the right axis, then about the axes down and forward
+        turns = np.stack((-attitude[:, :, 1], triad[:, :, 2], forward), axis=-1)
+        derivative[:, 3:, STATES : STATES + 3] = by_turn @ turns
     variance = ((derivative @ covariance) * derivative).sum(axis=-1)
-    sway = (derivative[:, 3:, ATTITUDE] @ attitude[:, :, 1, None])[..., 0]
+    sway = (by_turn @ attitude[:, :, 1, None])[..., 0]
     variance[:, 3:] += mount.tilt_variance * sway**2
     return np.asarray(np.sqrt(variance))

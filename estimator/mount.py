@@ -73,3 +73,21 @@ def camera_triads(attitude: Array, tilt: Array) -> Array:
     s, c = np.sin(tilt)[:, None], np.cos(tilt)[:, None]
     forward, right, down = attitude[:, :, 0], attitude[:, :, 1], attitude[:, :, 2]
     return np.stack((c * forward + s * down, right, c * down - s * forward), axis=-1)
+
+
+def turned_triads(triads: Array, pan: Array | float, roll: Array | float) -> Array:
+    """Camera triads (n, 3, 3) turned about their own axis down by `pan` and forward by `roll` (rad), to second order.
+
+    What is left is of the third order: 1e-6 rad at a degree.
+    """
+    forward, right, down = triads[:, :, 0], triads[:, :, 1], triads[:, :, 2]
+    p, r = np.broadcast_to(pan, len(triads))[:, None], np.broadcast_to(roll, len(triads))[:, None]
+    # exp of the rotation vector p down + r forward, column by column
+    return np.stack(
+        (
+            (1.0 - 0.5 * p * p) * forward + p * right + 0.5 * p * r * down,
+            (1.0 - 0.5 * (p * p + r * r)) * right - p * forward + r * down,
+            (1.0 - 0.5 * r * r) * down - r * right + 0.5 * p * r * forward,
+        ),
+        axis=-1,
+    )

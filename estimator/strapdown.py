@@ -317,6 +317,25 @@ def predicted(nominal: Array, covariance: Array, noise: Array, dt: float) -> tup
 
 
 @compiled
+def predicted_with_constants(nominal: Array, covariance: Array, noise: Array, dt: float) -> tuple[Array, Array]:
+    """As `predicted`, of a covariance (n, n) in which constants follow the 15 errors.
+
+    With P = [A B; Bᵀ C] it is [F A Fᵀ + Q, F B; (F B)ᵀ, C].
+    """
+    moved, moving = predicted(nominal, covariance[:STATES, :STATES].copy(), noise, dt)
+    F = transition(nominal, dt)
+    result = covariance.copy()
+    result[:STATES, :STATES] = moving
+    for i in range(STATES):
+        for j in range(STATES, covariance.shape[0]):
+            total = 0.0
+            for k in range(STATES):
+                total += F[i, k] * covariance[k, j]
+            result[i, j] = result[j, i] = total
+    return moved, result
+
+
+@compiled
 def _add_product(result: Array, sparse: Array, matrix: Array) -> None:
     """Add the product of two matrices (15, 15), of which the first is mostly zero, to a third."""
     for i in range(STATES):

@@ -107,7 +107,7 @@ def law_of(aircraft: AircraftConfig, approach: ApproachConfig, gravity: float, h
     )
 
 
-_ACQUIRE, _APPROACH, _FLARE, _ROLLOUT, _STOPPED = Phase  # an enum's attributes are looked up slowly
+_ACQUIRE, _APPROACH, _FLARE, _ROLLOUT, _STOPPED, _GO_AROUND = Phase  # an enum's attributes are looked up slowly
 
 
 class GuidanceState(NamedTuple):

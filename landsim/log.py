@@ -23,6 +23,12 @@ SOURCES = ("true", "vision", "fused", "sigma")
 LINES = ("left", "threshold", "right")
 ENDS = ("u0", "v0", "u1", "v1")
 AXES = ("x", "y", "z")
+CALIBRATION = (
+    "camera_tilt_error_deg", "camera_pan_error_deg", "camera_roll_error_deg", "focal_length_error",
+    "principal_u_error_px", "principal_v_error_px", "radial_distortion", "runway_width_error_m",
+)  # fmt: skip
+"""Of the camera and the runway, in the order of `estimator.single_lines.Calibration`; the width is the true one less
+that believed."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +57,16 @@ def _pose() -> list[Column]:
 
 def _vector(prefix: str, unit: str, frame: str, what: str, suffix: str) -> list[Column]:
     return [Column(f"{prefix}_{axis}_{suffix}", unit, frame, f"{what}, {axis}") for axis in AXES]
+
+
+def _calibration() -> list[Column]:
+    columns = []
+    for name in CALIBRATION:
+        unit = next((unit for unit in ("deg", "px", "m") if name.endswith(f"_{unit}")), "1")
+        what = name.rsplit("_", 1)[0].replace("_", " ") if unit != "1" else name.replace("_", " ")
+        columns.append(Column(f"fused_{name}", unit, "", f"{what} by the filter; NaN where it is not estimated"))
+        columns.append(Column(f"sigma_{name}", unit, "", f"{what}: the filter's standard deviation"))
+    return columns
 
 
 def _ends(kind: str, what: str) -> list[Column]:
@@ -94,6 +110,8 @@ COLUMNS: tuple[Column, ...] = (
     Column("nis", "1", "", "normalised innovation squared of this frame; NaN without a measurement"),
     Column("nis_dof", "1", "", "its degrees of freedom: 6 or 4"),
     Column("accepted", "1", "", "1 if this frame passed the gate"),
+    Column("lines_found", "1", "", "lines offered to the filter, summed: 1 left edge, 2 threshold, 4 right; at frames"),
+    Column("lines_believed", "1", "", "those that it took"),
     Column("nees9", "1", "", "normalised error squared of position, velocity and attitude; at frames"),
     Column("nees15", "1", "", "normalised error squared of all 15 states; at frames"),
     *_vector("true_gyro_bias", "deg/h", "body", "gyro bias, with what the scale factor makes of the rate", "deg_h"),
@@ -102,6 +120,7 @@ COLUMNS: tuple[Column, ...] = (
     *_vector("true_accel_bias", "m/s²", "body", "accelerometer bias, with what the scale factor makes of it", "mps2"),
     *_vector("fused_accel_bias", "m/s²", "body", "accelerometer bias by the filter", "mps2"),
     *_vector("sigma_accel_bias", "m/s²", "body", "its standard deviation", "mps2"),
+    *_calibration(),
     # what the camera saw; NaN between frames and for a line that is not in view
     *_ends("true", "as projected and clipped, no noise"),
     *_ends("seen", "as fitted to its noisy points"),

@@ -32,8 +32,8 @@ CRASHES = {
 """Those of the ends that are a crash, and what to say of it."""
 BEGIN = -1000.0
 """Tracking and navigation count from here: along the runway, m."""
-EARLY_NUMBERS, LATE_NUMBERS = 6, 4
-"""Degrees of freedom of a measurement of three lines, and of two."""
+ALL_LINES, BOTH_EDGES, THRESHOLD_LINE = 7, 5, 2
+"""Lines as bits: 1 left edge, 2 threshold, 4 right edge."""
 COASTING_S = 1.0
 """A filter that has believed no frame for longer is said to coast."""
 WITHIN = NormalDist().inv_cdf(0.975)
@@ -260,17 +260,18 @@ def navigation_errors(log: Log, end_row: int) -> dict[str, dict[str, dict[str, A
 def consistency(log: Log, touchdown: Touchdown | None) -> dict[str, dict[str, Any]]:
     """Mean normalised errors squared by phase: early and late in the air, coasting in the air, and the rollout.
 
-    A frame is early or late by the measurement that it offered, whether the gate let it pass or not; ``rejected`` says
-    how many it did not.  Coasting frames offered none.
+    A frame is early or late by the lines that it offered, with the threshold or without, whether the filter believed
+    them or not; ``rejected`` says of how many it believed none.  Coasting frames offered none.
     """
     rows = np.arange(log["time_s"].size)
     airborne = rows < (rows.size if touchdown is None else touchdown.row)
     frame = np.isfinite(log["nees9"])
-    offered = log["nis_dof"]
+    offered = np.nan_to_num(log["lines_found"]).astype(int)
+    threshold = (offered & THRESHOLD_LINE) != 0
     phases = {
-        "early": frame & airborne & (offered == EARLY_NUMBERS),
-        "late": frame & airborne & (offered == LATE_NUMBERS),
-        "coasting": frame & airborne & np.isnan(offered),
+        "early": frame & airborne & threshold,
+        "late": frame & airborne & ~threshold & (offered != 0),
+        "coasting": frame & airborne & (offered == 0),
         "rollout": frame & ~airborne & (log["phase"] < Phase.STOPPED),
     }
     return {

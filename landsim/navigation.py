@@ -1,27 +1,52 @@
 """Drives the estimator: from the inertial unit, the camera's lines and the pitot tube to the navigation state.
 
 Raw vision poses come from the paper's solvers.  The filter starts from the first of them, and from then on takes three
-lines whenever the threshold is in view and two when it is not.
+lines whenever the threshold is in view and two when it is not.  With ``aiding = "lines"`` it takes whatever lines there
+are, one by one, and leaves out those that disagree.
+
+A frame that arrives late is used at its capture: the filter then runs behind by the latency, and the inertial unit
+carries its state on to the present.
 """
 
 import math
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
 
-from estimator.alignment import Alignment, Incidence
+from estimator.alignment import Alignment, Incidence, Start
 from estimator.camera import PinholeCamera
 from estimator.compiled import compiled, rotate_back
 from estimator.covariance import LEFT, RIGHT, THRESHOLD
 from estimator.fusion import NO_UPDATE, Gates, InertialVisionFilter, Update
 from estimator.innovation import Eye, Innovation, frame_innovation
+from estimator.line_fusion import LineVisionFilter, carried
 from estimator.lines import unguarded_variances
 from estimator.mount import Mount, body_from_camera, camera_axes
+from estimator.single_lines import (
+    BOTH_EDGES,
+    CONSTANTS,
+    NO_CALIBRATION,
+    Calibration,
+    gates_of,
+    line_residuals,
+)
 from estimator.so3 import IDENTITY, Array
-from estimator.strapdown import ImuNoise, Inertial, Site, euler, unpacked
+from estimator.strapdown import (
+    STATES,
+    ImuNoise,
+    Inertial,
+    Site,
+    advance_into,
+    euler,
+    predicted,
+    process_noise,
+    unpacked,
+)
 from estimator.three_line import three_line_pose
 from landsim.config import MountConfig, NavigationConfig
-from landsim.state import CameraFrame, ImuSample, NavState, Stage
+from landsim.integrity import LineMonitor, protection_factor
+from landsim.state import Alarm, CameraFrame, ImuSample, NavState, Stage
 from landsim.units import DEG
 
 NAN = math.nan
@@ -41,6 +66,50 @@ class FrameResult(NamedTuple):
     """Of the camera triad, as predicted: what the late stage borrows, rad; NaN where it borrows none."""
     late: bool
     """Whether the threshold, in view or not, was left out of account."""
+    found: int | None = None
+    """Lines that were offered to the filter, as bits: 1 left edge, 2 threshold, 4 right edge; None where they follow
+    from the update's degrees of freedom, three lines of 6 and both edges of 4."""
+    believed: int | None = None
+    """Those of them that it took."""
+
+    def lines(self) -> tuple[int, int]:
+        """``found`` and ``believed``, whether they are said or follow."""
+        if self.found is not None and self.believed is not None:
+            return self.found, self.believed
+        found = _BY_DEGREES[self.update.degrees]
+        return found, found if self.update.accepted else 0
+
+
+_BY_DEGREES = {0: 0, 4: BOTH_EDGES, 6: 7}
+
+
+class Known(NamedTuple):
+    """What navigation says of its errors at the present."""
+
+    covariance: Array
+    """(15, 15)."""
+    bias: Array
+    """(6,), rad/s and m/s²."""
+    calibration: Array = NO_CALIBRATION
+    """(8,), as `estimator.single_lines.Calibration`."""
+    calibration_covariance: Array | None = None
+    """(23, 23), of all; None where the calibration is not estimated."""
+
+
+def calibration_sigma(config: NavigationConfig) -> Array:
+    """Standard deviations (8,) of the camera's calibration, as `estimator.single_lines.Calibration`."""
+    return np.array(
+        Calibration(
+            tilt=config.tilt_sigma_deg * DEG,
+            pan=config.pan_sigma_deg * DEG,
+            roll=config.roll_sigma_deg * DEG,
+            focal_length=config.focal_length_sigma,
+            principal_u=config.principal_sigma_px,
+            principal_v=config.principal_sigma_px,
+            distortion=config.distortion_sigma,
+            width=config.width_sigma_m,
+        )
+    )
 
 
 class Navigator:
@@ -62,6 +131,11 @@ class Navigator:
     config : NavigationConfig
     incidence : Incidence
         In steady flight.
+    latency : float
+        From the capture of a frame to `observe`, s: a whole number of the inertial unit's intervals.
+    handover : Start, optional
+        State and covariance (15, 15) that whatever flew before hands over, to start from; without it the filter starts
+        from the first vision poses.
 
     Attributes
     ----------
@@ -84,6 +158,8 @@ class Navigator:
         mount: Mount,
         config: NavigationConfig,
         incidence: Incidence,
+        latency: float = 0.0,
+        handover: Start | None = None,
     ) -> None:
         self._camera = camera
         self._noise_px = max(noise_px, config.min_noise_px)
@@ -106,6 +182,30 @@ class Navigator:
         self._late = False
         self.stage = Stage.NONE
         self.filter: InertialVisionFilter | None = None
+        self._lag = round(latency / imu_dt)
+        self._waiting: deque[ImuSample] = deque()
+        self._present: Array | None = None
+        self._monitor: LineMonitor | None = None
+        self._protection = protection_factor(config.integrity_risk)
+        if config.aiding == "lines":
+            self._calibration = calibration_sigma(config)
+            self._line_gates = gates_of(config.line_gate_probability)
+            self._monitor = LineMonitor(config.monitor_s, config.unaided_s)
+        if handover is not None:
+            self._start(handover)
+
+    def _start(self, start: Start) -> None:
+        """Start the filter; the covariance is that of the 15 errors, or of the calibration too."""
+        given = (self._camera, self._width, self._mount, self._site, self._imu)
+        if self._monitor is None:
+            self.filter = InertialVisionFilter(*given, self._gates, start)
+            return
+        covariance = start.covariance
+        if len(covariance) == STATES:
+            covariance = np.zeros((STATES + CONSTANTS, STATES + CONSTANTS))
+            covariance[:STATES, :STATES] = start.covariance
+            covariance[STATES:, STATES:] = np.diag(self._calibration**2)
+        self.filter = LineVisionFilter(*given, self._line_gates, Start(start.state, covariance))
 
     def _new_alignment(self) -> Alignment:
         config = self._config
@@ -120,28 +220,75 @@ class Navigator:
     def propagate(self, sample: ImuSample) -> None:
         """Take in a sample of the inertial unit."""
         self._sample = sample
-        if self.filter is None:
+        if self._lag:
+            self._propagate_late(sample)
+        elif self.filter is None:
             self._alignment.propagate(sample, self._dt)
         else:
             self._angles = self.filter.propagate(sample, self._dt)
 
+    def _propagate_late(self, sample: ImuSample) -> None:
+        """Carry the present on by this sample, and what runs behind by the one that is as old as the latency."""
+        self._waiting.append(sample)
+        due = self._waiting.popleft() if len(self._waiting) > self._lag else None
+        if self.filter is None:
+            if due is not None:
+                self._alignment.propagate(due, self._dt)
+            return
+        if due is not None:
+            self.filter.propagate(due, self._dt)
+        before = self.filter.nominal if self._present is None else self._present
+        self._present = np.empty_like(before)
+        self._angles = advance_into(self._present, before, self.filter.bias, sample, self._site.numbers(), self._dt)
+
+    def _to_the_present(self) -> None:
+        """Carry the filter's state on by the samples that it has not had yet."""
+        assert self.filter is not None
+        moved = self.filter.nominal.copy()
+        moved[15:] = 0.0
+        site = self._site.numbers()
+        for sample in self._waiting:
+            before, moved = moved, np.empty_like(moved)
+            advance_into(moved, before, self.filter.bias, sample, site, self._dt)
+        self._present = moved
+
     def observe(self, frame: CameraFrame) -> FrameResult:
         """Take in a camera frame."""
+        result = self._observe(frame)
+        if self._lag and self.filter is not None:
+            self._to_the_present()
+        return result
+
+    def _observe(self, frame: CameraFrame) -> FrameResult:
         self._angles = None  # as they will be known after the frame
         if self.filter is None:
-            return self._align(_observed(frame.lines, self._noise_px), frame.tilt)
+            return self._align(frame.lines, frame.tilt)
         self.filter.predict()
         lines, self._late, borrows = _without_threshold(frame.lines, self._noise_px, self._latch, self._late)
         roll = _camera_roll(self.filter.nominal, frame.tilt) if borrows else NAN
+        if isinstance(self.filter, LineVisionFilter):
+            return self._observe_lines(self.filter, frame, lines, roll)
         update = self.filter.observe(lines, frame.tilt)
         if update.degrees > 0:
             self._rejected = 0 if update.accepted else self._rejected + 1
         self.stage = Stage.NONE if not update.accepted else Stage.EARLY if update.degrees == 6 else Stage.LATE
         return FrameResult(update, self.stage, roll, self._late)
 
-    def _align(self, lines: Array, tilt: float) -> FrameResult:
+    def _observe_lines(self, running: LineVisionFilter, frame: CameraFrame, lines: Array, roll: float) -> FrameResult:
+        """A frame of which each line counts by itself."""
+        assert self._monitor is not None
+        update, found, believed = running.observe_lines(lines, _extent(frame.lines), frame.tilt)
+        self._monitor.take(frame.time, found, believed)
+        if found:
+            self._rejected = 0 if believed else self._rejected + 1
+        threshold = bool(believed & (1 << THRESHOLD))
+        self.stage = Stage.NONE if not believed else Stage.EARLY if threshold else Stage.LATE
+        return FrameResult(update, self.stage, roll, self._late, found, believed)
+
+    def _align(self, readings: Array, tilt: float) -> FrameResult:
         """One of the first frames: the filter starts when there are enough."""
         self.stage = Stage.NONE
+        lines = _observed(readings, self._noise_px)
         left, threshold, right = lines[:, :3]
         solution = three_line_pose(self._camera, left, threshold, right, runway_width=self._width)
         if not solution.valid:
@@ -157,13 +304,39 @@ class Navigator:
             if turn_sigma > self._config.start_attitude_sigma_deg * DEG:
                 # so far away a mean of poses is no start: begin again, nearer
                 self._alignment = self._new_alignment()
+            elif self._monitor is None:
+                self._start(self._alignment.start(self.airspeed, pose, self._mount, self._imu))
             else:
-                start = self._alignment.start(self.airspeed, pose, self._mount, self._imu)
-                self.filter = InertialVisionFilter(
-                    self._camera, self._width, self._mount, self._site, self._imu, self._gates, start
-                )
+                self._start(self._start_of_lines(eye, lines, _extent(readings), state.numbers(), tilt))
         self.stage = Stage.EARLY
         return FrameResult(NO_UPDATE, Stage.EARLY, NAN, late=False)
+
+    def _start_of_lines(self, eye: Array, lines: Array, extent: Array, nominal: Array, tilt: float) -> Start:
+        """The start with the calibration's part in it."""
+        _, H = line_residuals(eye, lines, extent, nominal, NO_CALIBRATION, tilt)
+        shared = H[:, STATES]  # the mount's angle as read is off for all lines alike
+        variance = np.diag(lines[:, 5:7].ravel()) + self._mount.tilt_variance * np.outer(shared, shared)
+        return self._alignment.start_of_lines(self.airspeed, H, variance, self._calibration, self._imu)
+
+    @property
+    def known(self) -> InertialVisionFilter | Known | None:
+        """What says covariance and bias at the present; None before the filter has started."""
+        running = self.filter
+        if running is None or not (self._lag or isinstance(running, LineVisionFilter)):
+            return running
+        calibration, augmented = NO_CALIBRATION, None
+        covariance = running.covariance
+        if isinstance(running, LineVisionFilter):
+            calibration, augmented = running.calibration, running.augmented_covariance
+        if self._lag and self._waiting and self._present is not None:
+            dt = len(self._waiting) * self._dt
+            noise = process_noise(self._imu, dt)
+            if augmented is not None:
+                augmented = carried(self._present, augmented, noise, dt)
+                covariance = augmented[:STATES, :STATES].copy()
+            else:
+                covariance = predicted(self._present, covariance, noise, dt)[1]
+        return Known(covariance, running.bias, calibration, augmented)
 
     @property
     def diverged(self) -> str | None:
@@ -184,8 +357,9 @@ class Navigator:
 
     @property
     def covariance(self) -> Array | None:
-        """Of the filter's errors (15, 15); None before it has started."""
-        return None if self.filter is None else self.filter.covariance
+        """Of the filter's errors (15, 15), at the present; None before it has started."""
+        known = self.known
+        return None if known is None else known.covariance
 
     @property
     def bias(self) -> Array | None:
@@ -200,6 +374,8 @@ class Navigator:
     @property
     def nominal(self) -> Array:
         """Position, velocity and attitude of the body (18,); not to be used before the filter has started."""
+        if self._present is not None:
+            return self._present
         return _UNKNOWN if self.filter is None else self.filter.nominal
 
     def roll_and_pitch(self) -> tuple[float, float]:
@@ -214,6 +390,10 @@ class Navigator:
         running = self.filter
         bias = _NO_BIAS if running is None else running.bias
         n = _known(self.nominal, bias, self._sample, self._earth_rate, self._dt).tolist()
+        lateral, vertical = NAN, NAN
+        if (covariance := self.covariance) is not None:
+            lateral = self._protection * math.sqrt(covariance.item(1, 1))
+            vertical = self._protection * math.sqrt(covariance.item(2, 2))
         return NavState(
             time,
             running is not None,
@@ -226,6 +406,9 @@ class Navigator:
             (n[18], n[19], n[20]),
             self.airspeed,
             self.stage,
+            lateral,
+            vertical,
+            Alarm.NONE if self._monitor is None else self._monitor.alarm(time),
         )
 
 
@@ -234,6 +417,12 @@ _NO_BIAS = np.zeros(6)
 
 
 _variances = compiled(unguarded_variances)
+
+
+def _extent(readings: Array) -> Array:
+    """Mean square distance (3,) of each line's points from their centroid, px²."""
+    result: Array = readings[:, 5] / readings[:, 6]
+    return result
 
 
 @compiled

@@ -13,13 +13,14 @@ from estimator.camera import PinholeCamera
 from estimator.compiled import compiled
 from estimator.fusion import InertialVisionFilter
 from estimator.innovation import camera_sigma
-from estimator.mount import Mount, camera_triads
+from estimator.mount import Mount, camera_triads, turned_triads
+from estimator.single_lines import AUGMENTED
 from estimator.so3 import Array, Vec3
-from estimator.strapdown import ACCEL_BIAS, GYRO_BIAS
+from estimator.strapdown import ACCEL_BIAS, GYRO_BIAS, STATES
 from estimator.three_line import three_line_pose
 from estimator.two_line import two_line_pose
-from landsim.log import AXES, COLUMNS, ENDS, LINES, QUANTITIES
-from landsim.navigation import FrameResult, Navigator
+from landsim.log import AXES, CALIBRATION, COLUMNS, ENDS, LINES, QUANTITIES
+from landsim.navigation import FrameResult, Known, Navigator
 from landsim.plugins.guard import WITHOUT_BIASES, Belief, GuardedEstimator
 from landsim.sensors import Imu, View
 from landsim.state import Command, Phase, Stage
@@ -36,7 +37,7 @@ class Body(NamedTuple):
 
 
 FRAME = {
-    "roll": 1, "late": 1, "nis_dof": 1, "nis": 1, "accepted": 1,
+    "roll": 1, "late": 1, "nis_dof": 1, "nis": 1, "accepted": 1, "lines_found": 1, "lines_believed": 1,
 }  # fmt: skip
 """The single numbers that `Recorder.frame` takes down, in its order."""
 
@@ -108,13 +109,21 @@ class Recorder:
         Of the camera.
     wheels : (3,) float
         Midpoint of the main wheels, body frame, m.
+    pan, roll : float
+        By how much the camera is truly turned on its mount, about its own axis down and forward, rad.
     """
 
-    def __init__(self, camera: PinholeCamera, width: float, mount: Mount, wheels: Vec3) -> None:
+    def __init__(
+        self, camera: PinholeCamera, width: float, mount: Mount, wheels: Vec3, pan: float = 0.0, roll: float = 0.0
+    ) -> None:
         self._camera = camera
         self._width = width
         self._mount = mount
         self._wheels = wheels
+        self._turned = pan, roll
+        self._calibration: list[Array] = []
+        self._calibration_rows: list[int] = []
+        self._augmented: list[Array] = []
         self._blocks: list[Array] = []
         self._block = np.empty((0, _WIDTH))
         self._row = 0
@@ -143,10 +152,12 @@ class Recorder:
         self._row += 1
         self._count += 1
 
-    def frame(self, view: View, result: FrameResult, running: InertialVisionFilter | Belief | None, imu: Imu) -> None:
+    def frame(
+        self, view: View, result: FrameResult, running: InertialVisionFilter | Known | Belief | None, imu: Imu
+    ) -> None:
         """Take down a camera frame."""
         update = result.update
-        self._frames += (result.roll, result.late, update.degrees, update.nis, update.accepted)
+        self._frames += (result.roll, result.late, update.degrees, update.nis, update.accepted, *result.lines())
         self._lines.append(view.frame.lines)
         self._true_ends.append(view.true_ends)
         self._seen_ends.append(view.seen_ends)
@@ -156,6 +167,10 @@ class Recorder:
             self._errors.append(imu.errors())
             self._filter_rows.append(self._count)
             self._covariance.append(running.covariance)
+            if isinstance(running, Known) and running.calibration_covariance is not None:
+                self._calibration.append(running.calibration)
+                self._augmented.append(running.calibration_covariance)
+                self._calibration_rows.append(self._count)
 
     def command(self, command: Command, phase: Phase, stage: Stage) -> None:
         """Take down what holds from this step to the next frame."""
@@ -178,8 +193,9 @@ class Recorder:
 
         log["time_s"] = step["time"]
         log["phase"], log["stage"] = command["phase"], command["stage"]
-        _pose(log, "true", true, self._mount.lever, tilt)
-        _pose(log, "fused", fused, self._mount.lever, reading)
+        _pose(log, "true", true, self._mount.lever, tilt, *self._turned)
+        lower, pan, roll = self._misalignment()
+        _pose(log, "fused", fused, self._mount.lever, reading + lower, pan, roll)
         x, y, z = true.position.T
         log["body_x_m"], log["body_y_m"], log["body_height_m"] = x, y, -z
         log["wheel_height_m"] = -z - true.attitude[:, 2, :] @ np.array(self._wheels)
@@ -214,6 +230,17 @@ class Recorder:
         if self._filter_rows and self._filter_rows[-1] == self._count:
             for frames in (self._filter_rows, self._bias, self._errors, self._covariance):
                 del frames[-1]
+        if self._calibration_rows and self._calibration_rows[-1] == self._count:
+            for frames in (self._calibration_rows, self._calibration, self._augmented):
+                del frames[-1]
+
+    def _misalignment(self) -> Array:
+        """Tilt, pan and roll (3, n) of the camera on its mount as estimated, rad; they hold from frame to frame."""
+        result = np.zeros((3, self._count))
+        if self._calibration:
+            counts = np.diff(np.append(self._calibration_rows, self._count))
+            result[:, self._calibration_rows[0] :] = np.repeat(_stacked(self._calibration)[:, :3].T, counts, axis=1)
+        return result
 
     def _frame_columns(self, log: dict[str, Array]) -> None:
         """Columns that have a value at camera frames alone."""
@@ -224,6 +251,8 @@ class Recorder:
         measured = frame["nis_dof"] > 0.0
         for name in ("nis_dof", "nis", "accepted"):
             log[name][at[measured]] = frame[name][measured]
+        for name in ("lines_found", "lines_believed"):
+            log[name][at] = frame[name]
         true_ends, seen_ends = _stacked(self._true_ends), _stacked(self._seen_ends)
         for i, line in enumerate(LINES):
             for k, end in enumerate(ENDS):
@@ -245,6 +274,17 @@ class Recorder:
         nothing = np.full(two.size, np.nan)
         pair = (nothing, late.lateral, late.height, nothing, np.degrees(late.pitch), np.degrees(late.yaw))
         return np.where(two, np.stack(pair), result)
+
+    def _calibration_columns(self, log: dict[str, Array]) -> None:
+        """The camera's calibration as estimated; it holds from frame to frame."""
+        at = self._calibration_rows
+        counts = np.diff(np.append(at, self._count))
+        estimate = _stacked(self._calibration)
+        deviation = np.sqrt(np.diagonal(_stacked(self._augmented), axis1=1, axis2=2)[:, STATES:AUGMENTED])
+        for i, name in enumerate(CALIBRATION):
+            unit = DEG if name.endswith("_deg") else 1.0
+            for kind, values in (("fused", estimate), ("sigma", deviation)):
+                log[f"{kind}_{name}"][at[0] :] = np.repeat(values[:, i] / unit, counts)
 
     def _filter_columns(self, log: dict[str, Array], true: Body, fused: Body, reading: Array) -> None:
         """The filter's sigmas, biases and normalised errors; sigmas and biases hold from frame to frame."""
@@ -274,10 +314,14 @@ class Recorder:
             log[name][at[0] :] = np.repeat(values, counts)
 
         known = np.nan_to_num(covariance) if without else covariance
+        if self._augmented and len(self._augmented) == at.size:
+            known = _stacked(self._augmented)
         sigma = camera_sigma(known, fused.attitude[at], self._mount, reading[at])
         sigma[:, 3:] /= DEG
         for i, quantity in enumerate(QUANTITIES):
             held(f"sigma_{quantity}", sigma[:, i])
+        if self._augmented:
+            self._calibration_columns(log)
         deviation = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
         for i, axis in enumerate(AXES):
             held(f"sigma_velocity_{axis}_mps", deviation[:, 3 + i])
@@ -299,9 +343,19 @@ def euler_deg(attitude: Array) -> tuple[Array, Array, Array]:
     )
 
 
-def _pose(log: dict[str, Array], source: str, body: Body, lever: Vec3, tilt: Array) -> None:
+def _pose(
+    log: dict[str, Array],
+    source: str,
+    body: Body,
+    lever: Vec3,
+    tilt: Array,
+    pan: Array | float = 0.0,
+    roll: Array | float = 0.0,
+) -> None:
     camera = body.position + body.attitude @ np.array(lever)
     triad = camera_triads(body.attitude, tilt)
+    if np.any(pan) or np.any(roll):
+        triad = turned_triads(triad, pan, roll)
     values = (camera[:, 0], camera[:, 1], -camera[:, 2], *euler_deg(triad))
     for quantity, value in zip(QUANTITIES, values, strict=True):
         log[f"{source}_{quantity}"] = value

@@ -7,7 +7,7 @@ from the navigation state, and the plant's own inner loops fly it until the next
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from numpy.random import Generator, SeedSequence, default_rng
@@ -18,6 +18,7 @@ from estimator.strapdown import unpacked
 from landsim.config import Scenario
 from landsim.dispersion import dispersed, draws_of_seed
 from landsim.errors import InputError, traceback_of
+from landsim.handover import handed_over
 from landsim.metrics import flight_metrics
 from landsim.navigation import mount_of
 from landsim.onboard import on_board
@@ -26,7 +27,7 @@ from landsim.plugins import ControllerSetup, EstimatorSetup, PlugInFault, contro
 from landsim.recorder import Recorder
 from landsim.runway import Runway
 from landsim.scene import believed_width, loading_of, runway_of, wind_of
-from landsim.sensors import Imu, LineCamera, Pitot, TiltMount, camera_of, site_of
+from landsim.sensors import Imu, LineCamera, Pitot, TiltMount, camera_of, imu_noise, site_of
 from landsim.truth import InitialState, Truth
 from landsim.units import DEG
 
@@ -103,7 +104,7 @@ def fly(scenario: Scenario, seed: int = 0, draws: Mapping[str, float] | None = N
     recorder = Recorder(
         camera_of(scenario.camera), believed_width(scenario), mount_of(aircraft.mount), aircraft.gear.main_wheels_body_m
     )
-    seeds = SeedSequence(seed).spawn(5)
+    seeds = SeedSequence(seed).spawn(8)
     start = draw_start(scenario, default_rng(seeds[0]))
     traceback = None
     try:
@@ -170,7 +171,7 @@ def _fly(
     imu_dt = imu_every * dt
     limit = math.ceil(settings.time_limit_s * settings.rate_hz) + 1
 
-    imu_rng, pitot_rng, mount_rng, camera_rng = (default_rng(seed) for seed in seeds)
+    imu_rng, pitot_rng, mount_rng, camera_rng = (default_rng(seed) for seed in seeds[:4])
     runway = runway_of(scenario)
     site = site_of(runway)
     plant = Plant(aircraft.folder, aircraft.model, runway, settings.rate_hz, loading_of(scenario))
@@ -187,6 +188,9 @@ def _fly(
     pitot = Pitot(scenario.pitot, dt, truth, pitot_rng)
     mount = TiltMount(aircraft.mount, dt, mount_rng, scenario.camera.tilt_error_deg * DEG)
     camera = LineCamera(scenario.camera, aircraft.mount.position_body_m, runway, camera_rng)
+    if scenario.navigation.start == "handover":
+        handover = handed_over(truth, scenario.navigation, imu_noise(scenario.imu), default_rng(seeds[6]))
+        estimator = replace(estimator, handover=handover)
     navigator = estimator_of(scenario.plug_ins.estimator, estimator)
     guidance = controller_of(scenario.plug_ins.controller, controller)
     command, _ = guidance.guide(navigator.state(0.0))
@@ -209,7 +213,7 @@ def _fly(
         if step % frame_every == 0:
             view = camera.view(truth, mount.tilt, tilt_reading)
             result = navigator.observe(view.frame)
-            recorder.frame(view, result, navigator.filter, imu)
+            recorder.frame(view, result, navigator.known, imu)
             diverged = navigator.diverged
             command, phase = guidance.guide(navigator.state(truth.time))
             recorder.command(command, phase, navigator.stage)

@@ -174,6 +174,7 @@ def _navigation(log: dict[str, Array], frames: NDArray[np.bool_], rng: np.random
         log[f"sigma_{quantity}"] = np.where(running, fused_sigma, math.nan)
     measured = frames & running & (log["stage"] > 0)
     log["nis_dof"] = np.where(measured, np.where(log["stage"] == 1, 6.0, 4.0), math.nan)
+    log["lines_found"] = np.where(measured, np.where(log["stage"] == 1, 7.0, 5.0), 0.0)
     log["nis"] = np.where(measured, rng.chisquare(np.where(log["stage"] == 1, 6.0, 4.0)), math.nan)
     log["accepted"] = np.where(measured, 1.0, math.nan)
     log["nees9"] = np.where(frames & running, rng.chisquare(9.0, n), math.nan)

@@ -108,7 +108,7 @@ def test_a_frame_has_the_stage_of_what_it_offered(
     log = approaching([-20.0])
     for line in lines.split():
         log[f"{line}_seen_u0"][0] = 100.0
-    log["nis_dof"][0], log["stage"][0] = numbers, stage
+    log["lines_found"][0], log["stage"][0] = {6.0: 7.0, 4.0: 5.0}.get(numbers, 0.0), stage
     log["fused_along_m"][0] = -20.0 if known else math.nan
     assert by_distance(log, np.array([20.0]), 1)["stage"][0] == expected
 

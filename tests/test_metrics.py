@@ -267,11 +267,13 @@ def test_navigation_errors() -> None:
 
 def test_consistency_by_phase() -> None:
     log = landing(phase={LAST: 4.0})
-    log["nees9"][:], log["nees15"][:], log["nis_dof"][:], log["accepted"][:] = np.nan, np.nan, np.nan, np.nan
+    for name in ("nees9", "nees15", "nis_dof", "accepted", "lines_found"):
+        log[name][:] = np.nan
     for row, value in {0: 8.0, 2: 7.0, 4: 10.0, 6: 3.0, 9: 5.0, 10: 20.0, 30: 30.0, LAST: 1000.0}.items():
         log["nees9"][row], log["nees15"][row] = value, 2.0 * value
     for row, numbers, accepted in ((0, 6.0, 1.0), (4, 6.0, 0.0), (6, 4.0, 1.0), (9, 4.0, 1.0), (10, 4.0, 0.0)):
         log["nis_dof"][row], log["accepted"][row] = numbers, accepted
+        log["lines_found"][row] = 7.0 if numbers == 6.0 else 5.0
     assert measured(log)["consistency"] == {
         "early": {"nees9_mean": 9.0, "nees15_mean": 18.0, "frames": 2, "rejected": 1},
         "late": {"nees9_mean": 4.0, "nees15_mean": 8.0, "frames": 2, "rejected": 0},

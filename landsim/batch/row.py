@@ -17,7 +17,7 @@ from landsim.config import Scenario
 from landsim.dispersion import dispersed, draws_of_seed, keys_of
 from landsim.errors import InputError, traceback_of
 from landsim.log import QUANTITIES, Log
-from landsim.metrics import CRASHES, EARLY_NUMBERS, LATE_NUMBERS, error
+from landsim.metrics import ALL_LINES, BOTH_EDGES, CRASHES, error
 from landsim.simulate import Flight, fly, must_fly
 from landsim.state import Stage
 
@@ -272,7 +272,7 @@ def _offered(log: Log) -> Array:
     Before the filter starts, frames with three lines are those from which it does.
     """
     three = np.all([np.isfinite(log[f"{line}_seen_u0"]) for line in ("left", "threshold", "right")], axis=0)
-    offered = log["nis_dof"]
-    waiting = np.isnan(log["fused_along_m"]) | (np.isnan(offered) & (log["stage"] == Stage.EARLY))
-    early = (offered == EARLY_NUMBERS) | (three & waiting)
-    return np.select([early, offered == LATE_NUMBERS], [float(Stage.EARLY), float(Stage.LATE)], float(Stage.NONE))
+    offered = log["lines_found"]
+    waiting = np.isnan(log["fused_along_m"]) | ((offered == 0.0) & (log["stage"] == Stage.EARLY))
+    early = (offered == ALL_LINES) | (three & waiting)
+    return np.select([early, offered == BOTH_EDGES], [float(Stage.EARLY), float(Stage.LATE)], float(Stage.NONE))

@@ -18,7 +18,7 @@ from estimator.strapdown import STATES, Inertial
 from landsim.errors import one_line
 from landsim.navigation import FrameResult
 from landsim.plugins.interface import Controller, Estimator, not_ready
-from landsim.state import CameraFrame, Command, ImuSample, NavState, Phase, Stage
+from landsim.state import Alarm, CameraFrame, Command, ImuSample, NavState, Phase, Stage
 
 NAN = math.nan
 ORTHONORMAL = 1e-3
@@ -224,7 +224,22 @@ class GuardedEstimator:
             cast("Vec3", guard.numbers("state", "rate", given.rate, 3)),
             guard.number("state", "airspeed", given.airspeed),
             self._stage(given.stage),
+            self._level("lateral_protection", given.lateral_protection),
+            self._level("vertical_protection", given.vertical_protection),
+            self._alarm(given.alarm),
         )
+
+    def _level(self, name: str, given: Any) -> float:
+        """A protection level; NaN for none."""
+        if isinstance(given, float) and math.isnan(given):
+            return given
+        return self._guard.number("state", name, given, low=0.0)
+
+    def _alarm(self, given: Any) -> Alarm:
+        try:
+            return Alarm(given)
+        except (TypeError, ValueError):
+            raise self._guard.fault("state", f"alarm must be an Alarm, not {_shown(given)}") from None
 
     def _stage(self, given: Any) -> Stage:
         try:
@@ -244,7 +259,7 @@ class GuardedEstimator:
         return one_line(why) if isinstance(why, str) else "it says so"
 
     @property
-    def filter(self) -> Belief | None:
+    def known(self) -> Belief | None:
         """What it says of its errors."""
         if not self.ready or (told := self._optional("covariance")) is None:
             return None

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 from numpy.random import Generator
 
-from estimator.alignment import Incidence
+from estimator.alignment import Incidence, Start
 from estimator.camera import PinholeCamera
 from estimator.mount import Mount
 from estimator.so3 import IDENTITY, Array, Vec3, flat, to_euler
@@ -47,6 +47,10 @@ class EstimatorSetup:
         The scenario's ``[plug-ins.estimator_settings]``; empty without them.
     rng : numpy.random.Generator
         For an estimator that draws, such as a particle filter: its numbers come from the flight's seed.
+    latency : float
+        From a frame's capture, which is its ``time``, to `Estimator.observe`, s; a whole multiple of ``imu_dt``.
+    handover : Start or None
+        State and covariance (15, 15) that whatever flew before hands over at time zero; None where there is nothing.
     """
 
     camera: PinholeCamera
@@ -61,6 +65,8 @@ class EstimatorSetup:
     config: NavigationConfig
     settings: Mapping[str, Any]
     rng: Generator
+    latency: float = 0.0
+    handover: Start | None = None
 
 
 @dataclass(frozen=True)

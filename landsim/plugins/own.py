@@ -20,6 +20,8 @@ def landsim_estimator(setup: EstimatorSetup) -> Navigator:
         setup.mount,
         setup.config,
         setup.incidence,
+        setup.latency,
+        setup.handover,
     )
 
 

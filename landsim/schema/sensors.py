@@ -101,3 +101,51 @@ class NavigationConfig(Section):
     """Diverged when more frames than this in succession do not pass the gate."""
     handover: Literal["in-view", "latched"] = "in-view"
     """When three lines are used: whenever the threshold is in view, or until it has once left the image."""
+    aiding: Literal["pose", "lines"] = "pose"
+    """What the filter takes: the pose of three lines or two, or whatever lines there are, each judged by itself."""
+    line_gate_probability: Annotated[float, Field(gt=0.0, lt=0.5)] = 1e-6
+    """At which a good line is left out by chance, with ``aiding = "lines"``."""
+    monitor_s: Positive = 0.3
+    """A line that has been left out for so long is taken for another, and an alarm is raised."""
+    unaided_s: Positive = 2.0
+    """So long without a believed line raises an alarm."""
+    integrity_risk: Annotated[float, Field(gt=0.0, lt=0.5)] = 1e-4
+    """With which the error may pass the protection level, at any one time."""
+    tilt_sigma_deg: NotNegative = 0.0
+    """1 σ, as the filter believes, of the camera's calibration, which it estimates with ``aiding = "lines"``: of the
+    optical axis against the mount's angle,"""
+    pan_sigma_deg: NotNegative = 0.0
+    """to the side,"""
+    roll_sigma_deg: NotNegative = 0.0
+    """about the optical axis,"""
+    focal_length_sigma: NotNegative = 0.0
+    """of the focal length, as a share of it,"""
+    principal_sigma_px: NotNegative = 0.0
+    """of the principal point, in u and in v,"""
+    distortion_sigma: NotNegative = 0.0
+    """of the radial distortion that calibration left,"""
+    width_sigma_m: NotNegative = 0.0
+    """and of the runway's width."""
+    start: Literal["vision", "handover"] = "vision"
+    """From what the filter starts: the first vision poses, or a state that a GNSS/INS approach hands over, off by
+    numbers that each seed draws from the standard deviations that it comes with:"""
+    handover_along_sigma_m: Positive = 3.0
+    handover_cross_sigma_m: Positive = 3.0
+    handover_height_sigma_m: Positive = 4.0
+    handover_velocity_sigma_mps: Positive = 0.2
+    """On each axis."""
+    handover_attitude_sigma_deg: Positive = 0.2
+    """Of roll and of pitch."""
+    handover_heading_sigma_deg: Positive = 0.5
+
+    @model_validator(mode="after")
+    def _calibration_by_lines(self) -> Self:
+        names = (
+            "tilt_sigma_deg", "pan_sigma_deg", "roll_sigma_deg", "focal_length_sigma", "principal_sigma_px",
+            "distortion_sigma", "width_sigma_m",
+        )  # fmt: skip
+        if self.aiding == "pose":
+            for name in names:
+                if getattr(self, name) > 0.0:
+                    raise refused('must be 0 with aiding = "pose": the calibration is estimated from lines', name)
+        return self
