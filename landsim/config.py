@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from landsim.errors import ScenarioError, did_you_mean, is_text, what_is_wrong
 from landsim.resources import AIRCRAFT_FILE, find_aircraft, find_scenario
 from landsim.schema import (
+    AirConfig,
     AircraftChoice,
     AircraftConfig,
     AircraftFile,
@@ -30,6 +31,7 @@ from landsim.schema import (
     FlareGains,
     GearConfig,
     GuidanceConfig,
+    GustConfig,
     ImuConfig,
     LoadingConfig,
     MountConfig,
@@ -45,12 +47,14 @@ from landsim.schema import (
     SpeedsConfig,
     StartConfig,
     StudyConfig,
+    TurbulenceConfig,
     WindConfig,
     field_names,
     fields_by_key,
 )
 
 __all__ = [
+    "AirConfig",
     "AircraftChoice",
     "AircraftConfig",
     "AircraftFile",
@@ -65,6 +69,7 @@ __all__ = [
     "FlareGains",
     "GearConfig",
     "GuidanceConfig",
+    "GustConfig",
     "ImuConfig",
     "LoadingConfig",
     "MountConfig",
@@ -80,6 +85,7 @@ __all__ = [
     "SpeedsConfig",
     "StartConfig",
     "StudyConfig",
+    "TurbulenceConfig",
     "WindConfig",
     "load_aircraft",
     "load_scenario",

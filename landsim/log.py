@@ -90,6 +90,7 @@ COLUMNS: tuple[Column, ...] = (
     *_vector("fused_velocity", "m/s", "runway", "velocity from the filter", "mps"),
     *_vector("sigma_velocity", "m/s", "runway", "the filter's standard deviation of the velocity", "mps"),
     Column("true_airspeed_mps", "m/s", "", "true airspeed"),
+    *_vector("wind", "m/s", "runway", "true velocity of the air", "mps"),
     Column("pitot_airspeed_mps", "m/s", "", "airspeed as measured"),
     # commands and controls
     Column("command_pitch_deg", "deg", "body in runway", "pitch command"),

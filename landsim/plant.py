@@ -21,12 +21,14 @@ import numpy as np
 from estimator.compiled import compiled
 from estimator.so3 import Array, Vec3, rotate, rotate_back
 from estimator.strapdown import inertial, rows
+from landsim.atmosphere import STANDARD_AIR, Atmosphere, standard_density
 from landsim.attitude import runway_attitude
+from landsim.config import AirConfig
 from landsim.errors import InputError
 from landsim.runway import Runway
 from landsim.state import Command
 from landsim.truth import MOTION, NOMINAL, NUMBERS, InitialState, Loading, Truth
-from landsim.units import DEG, FT, INCH, LB, LBF
+from landsim.units import DEG, FT, HPA_IN_PSF, INCH, KELVIN_IN_RANKINE, LB, LBF, SLUG
 
 RUN_UP_S = 1.0
 """Time the engine runs, airframe held, before trim: JSBSim's search for a steady propeller diverges from standstill."""
@@ -36,6 +38,9 @@ TERRAIN_HEIGHT = 30.0
 CONTACT_HEIGHT = 10.0
 """m; above it none touches the ground: contacts are not asked."""
 _ON_GROUND = MOTION + 7
+_WIND = 15
+"""Where the site's numbers end with the wind."""
+_GUST = ("atmosphere/gust-north-fps", "atmosphere/gust-east-fps", "atmosphere/gust-down-fps")
 
 _INTEGRATORS = (
     "simulation/integrator/rate/rotational",
@@ -239,6 +244,15 @@ class Plant:
         Steps a second.
     loading : Loading
         How its mass differs from the nominal one.
+    atmosphere : Atmosphere, optional
+        The wind along the way; without it the wind is that of the start throughout.
+    air : AirConfig, optional
+        How the air differs from the standard atmosphere.
+
+    Attributes
+    ----------
+    density_ratio : float
+        Density of the air at the start over that of the standard atmosphere there; exactly 1 where it is standard.
 
     Raises
     ------
@@ -248,13 +262,26 @@ class Plant:
 
     trim: TrimPoint
 
-    def __init__(self, folder: Path, model: str, runway: Runway, rate_hz: float, loading: Loading = NOMINAL) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        model: str,
+        runway: Runway,
+        rate_hz: float,
+        loading: Loading = NOMINAL,
+        atmosphere: Atmosphere | None = None,
+        air: AirConfig = STANDARD_AIR,
+    ) -> None:
         self._runway = runway
+        self._atmosphere = atmosphere
+        self._air = air
+        self.density_ratio = 1.0
         self._site = np.array(
             (
                 *(FT * r for r in runway.R_runway_from_ecef),
                 *rotate(runway.R_runway_from_ecef, runway.origin_in_ecef),
                 *(runway.latitude, runway.longitude, runway.heading),
+                *CALM,
             )
         )
         self._rows = rows(NUMBERS)
@@ -275,6 +302,7 @@ class Plant:
         self._command = tuple(node(fdm, name).set_double_value for name in _COMMAND)
         self._set_terrain = node(fdm, "position/terrain-elevation-asl-ft").set_double_value
         self._loading = loading
+        self._set_gust = tuple(node(fdm, name).set_double_value for name in _GUST)
         self._turn = tuple(node(fdm, name).get_double_value for name in _TURN)
         if loading != NOMINAL and any(manager.get_node(f"{_BALLAST}[{i}]", False) is None for i in range(3)):
             raise PlantError(
@@ -321,6 +349,11 @@ class Plant:
             self._set("ic/gamma-deg", math.atan2(-down, math.hypot(north, east)) / DEG)
         else:
             self._set_wind(rotate_back(R_runway_from_ned, ground), rotate_back(R_runway_from_ned, initial.wind))
+        if self._air != STANDARD_AIR:
+            self._set("atmosphere/delta-T", self._air.temperature_offset_c * KELVIN_IN_RANKINE)
+            self._set("atmosphere/P-sl-psf", self._air.pressure_hpa * HPA_IN_PSF)
+        self._site[_WIND:] = initial.wind
+        self._start_wind, self._R_runway_from_ned = initial.wind, R_runway_from_ned
         try:
             self._fdm.run_ic()
             if self._loading != NOMINAL:
@@ -336,7 +369,9 @@ class Plant:
             self._fdm.do_trim(int(jsbsim.TrimMode.FULL))
         except jsbsim.TrimFailureError as error:
             raise TrimError(self._trim_message(initial, listener.heard)) from error
-        truth = self._truth()
+        if self._air != STANDARD_AIR:
+            self.density_ratio = self._get("atmosphere/rho-slugs_ft3") * SLUG / FT**3 / standard_density(height)
+        truth = self._last = self._truth()
         self.trim = TrimPoint(
             alpha=self._get("aero/alpha-rad"),
             elevator=truth.elevator,
@@ -450,12 +485,24 @@ class Plant:
         StepError
             When JSBSim fails.
         """
+        if self._atmosphere is not None:
+            self._blow(self._atmosphere)
         try:
             self._run()
         except jsbsim.BaseError as error:
             raise StepError(f"JSBSim failed in flight: {error}") from error
         self._steps += 1
-        return self._truth()
+        truth = self._last = self._truth()
+        return truth
+
+    def _blow(self, atmosphere: Atmosphere) -> None:
+        """Set the wind of the next step: JSBSim has that of the start, and is given the difference as a gust."""
+        wind = atmosphere.at(self._last.motion, self._last.airspeed)
+        self._site[_WIND:] = wind
+        x, y, z = self._start_wind
+        gust = rotate_back(self._R_runway_from_ned, (wind[0] - x, wind[1] - y, wind[2] - z))
+        for set_one, speed in zip(self._set_gust, gust, strict=True):
+            set_one(speed / FT)
 
     def _truth(self) -> Truth:
         (
@@ -475,7 +522,7 @@ class Plant:
                 on_nose, on_left, on_right = self._wheels
                 nose, left, right = on_nose() != 0.0, on_left() != 0.0, on_right() != 0.0
                 if nose or left or right:
-                    motion[_ON_GROUND:] = nose, left, right
+                    motion[_ON_GROUND : _ON_GROUND + 3] = nose, left, right
                 for touches in self._structure:
                     if touches() != 0.0:
                         touching = True
@@ -521,7 +568,8 @@ def _motion(
 
     The rest of its numbers stands there as it is given, with no wheel on the ground.
 
-    `site` is R_runway_from_ecef times a foot, the origin in its axes (m), latitude, longitude and heading.  Returned
+    `site` is R_runway_from_ecef times a foot, the origin in its axes (m), latitude, longitude, heading and the wind
+    (runway frame, m/s).  Returned
     are the z of the position (m) and the cosine of the angle between the verticals.
     """
     cosine, attitude = _attitude(site[12], site[13], site[14], latitude, longitude, phi, theta, psi)
@@ -533,5 +581,6 @@ def _motion(
         motion[6 + i] = attitude[i]
     motion[15], motion[16], motion[17], motion[18] = time, airspeed, elevator, aileron
     motion[19], motion[20], motion[21] = rudder, throttle, thrust
-    motion[22:] = 0.0
+    motion[22], motion[23], motion[24] = 0.0, 0.0, 0.0
+    motion[25], motion[26], motion[27] = site[15], site[16], site[17]
     return motion[2], cosine

@@ -203,6 +203,8 @@ class Recorder:
         for i, axis in enumerate(AXES):
             log[f"true_velocity_{axis}_mps"] = true.velocity[:, i]
             log[f"fused_velocity_{axis}_mps"] = fused.velocity[:, i]
+        for axis in AXES:
+            log[f"wind_{axis}_mps"] = step[f"wind_{axis}"]
         log["true_airspeed_mps"], log["pitot_airspeed_mps"] = step["airspeed"], pitot
         for wheel in ("nose", "left", "right"):
             log[f"wow_{wheel}"] = step[f"wow_{wheel}"]

@@ -1,7 +1,10 @@
 """From the settings of a scenario to what the simulation is made of."""
 
+from numpy.random import Generator
+
 from estimator.alignment import Incidence
 from estimator.so3 import Vec3
+from landsim.atmosphere import Atmosphere, is_steady, mean_wind
 from landsim.config import AircraftConfig, Scenario
 from landsim.runway import Runway
 from landsim.truth import Loading
@@ -26,9 +29,16 @@ def believed_width(scenario: Scenario) -> float:
     return scenario.runway.width_m + scenario.runway.width_error_m
 
 
-def wind_of(scenario: Scenario) -> Vec3:
-    """Velocity of the air, runway frame, m/s: a head wind comes against x, a cross wind blows along y."""
-    return -scenario.wind.head_mps, scenario.wind.cross_mps, 0.0
+def wind_of(scenario: Scenario, height: float) -> Vec3:
+    """Mean velocity of the air at a height above the runway (m), runway frame, m/s."""
+    return mean_wind(scenario.wind, height)
+
+
+def atmosphere_of(scenario: Scenario, rng: Generator) -> Atmosphere | None:
+    """The wind along a flight; None if it is the same everywhere and at all times."""
+    if is_steady(scenario.wind, scenario.gust, scenario.turbulence):
+        return None
+    return Atmosphere(scenario.wind, scenario.gust, scenario.turbulence, 1.0 / scenario.simulation.rate_hz, rng)
 
 
 def loading_of(scenario: Scenario) -> Loading:

@@ -150,7 +150,7 @@ def _white(sigma: float, rng: Generator) -> Iterator[float]:
 class Pitot:
     """The airspeed: a first-order lag, an error of scale, and white noise on each sample.
 
-    It gives true airspeed: that the density is known on board is an idealisation.
+    It gives true airspeed, made from the pressure with the density of the standard atmosphere.
 
     Parameters
     ----------
@@ -159,11 +159,15 @@ class Pitot:
         Between samples, s.
     start : Truth
     rng : Generator
+    density_ratio : float
+        Of the air over that of the standard atmosphere.
     """
 
-    def __init__(self, config: PitotConfig, dt: float, start: Truth, rng: Generator) -> None:
+    def __init__(
+        self, config: PitotConfig, dt: float, start: Truth, rng: Generator, density_ratio: float = 1.0
+    ) -> None:
         self._noise = _white(config.noise_mps, rng)
-        self._scale = 1.0 + config.scale_error
+        self._scale = (1.0 + config.scale_error) * math.sqrt(density_ratio)
         self._gain = 1.0 if config.lag_s == 0.0 else 1.0 - math.exp(-dt / config.lag_s)
         self._lagged = start.airspeed
 

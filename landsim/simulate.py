@@ -26,7 +26,7 @@ from landsim.plant import Plant, StepError, TrimError
 from landsim.plugins import ControllerSetup, EstimatorSetup, PlugInFault, controller_of, estimator_of, versions_of
 from landsim.recorder import Recorder
 from landsim.runway import Runway
-from landsim.scene import believed_width, loading_of, runway_of, wind_of
+from landsim.scene import atmosphere_of, believed_width, loading_of, runway_of, wind_of
 from landsim.sensors import Imu, LineCamera, Pitot, TiltMount, camera_of, imu_noise, site_of
 from landsim.truth import InitialState, Truth
 from landsim.units import DEG
@@ -62,12 +62,13 @@ def draw_start(scenario: Scenario, rng: Generator) -> InitialState:
     s = scenario.start
     cross, height, heading, speed = rng.standard_normal(4).tolist()
     nominal = scenario.aircraft_config.speeds.approach_mps if s.speed_mps is None else s.speed_mps
+    up = s.height_m + s.height_sigma_m * height
     return InitialState(
-        position=(s.along_m, s.cross_m + s.cross_sigma_m * cross, -(s.height_m + s.height_sigma_m * height)),
+        position=(s.along_m, s.cross_m + s.cross_sigma_m * cross, -up),
         speed=nominal + s.speed_sigma_mps * speed,
         heading=(s.heading_deg + s.heading_sigma_deg * heading) * DEG,
         flight_path=s.flight_path_deg * DEG,
-        wind=wind_of(scenario),
+        wind=wind_of(scenario, up),
     )
 
 
@@ -174,7 +175,9 @@ def _fly(
     imu_rng, pitot_rng, mount_rng, camera_rng = (default_rng(seed) for seed in seeds[:4])
     runway = runway_of(scenario)
     site = site_of(runway)
-    plant = Plant(aircraft.folder, aircraft.model, runway, settings.rate_hz, loading_of(scenario))
+    atmosphere = atmosphere_of(scenario, default_rng(seeds[4]))
+    loading = loading_of(scenario)
+    plant = Plant(aircraft.folder, aircraft.model, runway, settings.rate_hz, loading, atmosphere, scenario.air)
     wheels = aircraft.gear.main_wheels_body_m
     height = -start.position[2]
     if height < wheels[2]:
@@ -185,7 +188,7 @@ def _fly(
         return End("trim_failed", str(error))
 
     imu = Imu(scenario.imu, site, truth, imu_rng)
-    pitot = Pitot(scenario.pitot, dt, truth, pitot_rng)
+    pitot = Pitot(scenario.pitot, dt, truth, pitot_rng, plant.density_ratio)
     mount = TiltMount(aircraft.mount, dt, mount_rng, scenario.camera.tilt_error_deg * DEG)
     camera = LineCamera(scenario.camera, aircraft.mount.position_body_m, runway, camera_rng)
     if scenario.navigation.start == "handover":

@@ -22,7 +22,7 @@ class InitialState(NamedTuple):
     flight_path: float
     """Flight-path angle over the ground, rad, climb positive."""
     wind: Vec3 = (0.0, 0.0, 0.0)
-    """Velocity of the air, runway frame, m/s: steady, the same everywhere."""
+    """Velocity of the air where it begins, runway frame, m/s."""
 
 
 class Loading(NamedTuple):
@@ -40,7 +40,8 @@ NOMINAL = Loading()
 MOTION = 15
 """Numbers of position, velocity and attitude, as `estimator.strapdown.Inertial.numbers` begins."""
 AFTER_MOTION = (
-    "time", "airspeed", "elevator", "aileron", "rudder", "throttle", "thrust", "wow_nose", "wow_left", "wow_right"
+    "time", "airspeed", "elevator", "aileron", "rudder", "throttle", "thrust", "wow_nose", "wow_left", "wow_right",
+    "wind_x", "wind_y", "wind_z",
 )  # fmt: skip
 """The single numbers that follow."""
 NUMBERS = MOTION + len(AFTER_MOTION)
@@ -53,7 +54,7 @@ class Truth(NamedTuple):
     time: float
     """s since the start."""
     motion: Array
-    """(25,): position, velocity and attitude, and what `AFTER_MOTION` names; never written to.
+    """(28,): position, velocity and attitude, and what `AFTER_MOTION` names; never written to.
 
     They are those of the body's origin, which is the centre of gravity of the aircraft as it is nominally loaded.
     """

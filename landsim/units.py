@@ -28,6 +28,10 @@ SLUG = LBF / FT
 """kg per slug."""
 HP = 550.0 * FT * LBF
 """W per mechanical horsepower."""
+KELVIN_IN_RANKINE = 1.8
+"""Degrees Rankine per kelvin, of differences (exact)."""
+HPA_IN_PSF = 100.0 * FT**2 / LBF
+"""Pounds per square foot per hectopascal."""
 HOUR = 3600.0
 """s per hour."""
 MILLI_G = 1e-3 * STANDARD_GRAVITY

@@ -32,13 +32,16 @@ from landsim.schema.base import LARGEST, Section, field_names, fields_by_key, ro
 from landsim.schema.dispersions import CorrelationConfig, DispersionsConfig, DrawConfig
 from landsim.schema.drawn import SPREAD_BY_SEED, applied, drawable, refusal, value_of, with_values
 from landsim.schema.flight import (
+    AirConfig,
     AircraftChoice,
     ApproachConfig,
     BoxConfig,
+    GustConfig,
     LoadingConfig,
     RunwayConfig,
     SimulationConfig,
     StartConfig,
+    TurbulenceConfig,
     WindConfig,
 )
 from landsim.schema.plug_ins import OWN, PlugInsConfig
@@ -50,6 +53,7 @@ __all__ = [
     "LARGEST",
     "OWN",
     "SPREAD_BY_SEED",
+    "AirConfig",
     "AircraftChoice",
     "AircraftConfig",
     "AircraftFile",
@@ -64,6 +68,7 @@ __all__ = [
     "FlareGains",
     "GearConfig",
     "GuidanceConfig",
+    "GustConfig",
     "ImuConfig",
     "LoadingConfig",
     "MountConfig",
@@ -79,6 +84,7 @@ __all__ = [
     "SpeedsConfig",
     "StartConfig",
     "StudyConfig",
+    "TurbulenceConfig",
     "WindConfig",
     "applied",
     "drawable",

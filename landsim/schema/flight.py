@@ -66,13 +66,71 @@ class StartConfig(Section):
     speed_sigma_mps: NotNegative = 1.0
 
 
-class WindConfig(Section):
-    """``[wind]``: a steady wind, the same everywhere, down to the ground; nobody on board is told of it."""
+_WindSpeed = Annotated[float, Field(ge=-100.0, le=100.0)]
 
-    head_mps: Annotated[float, Field(ge=-100.0, le=100.0)] = 0.0
+
+class WindConfig(Section):
+    """``[wind]``: the mean wind; nobody on board is told of it."""
+
+    head_mps: _WindSpeed = 0.0
     """Against the landing direction; a tail wind is negative."""
-    cross_mps: Annotated[float, Field(ge=-100.0, le=100.0)] = 0.0
+    cross_mps: _WindSpeed = 0.0
     """Towards the right, as ``cross_m`` is: from the left."""
+    profile: Literal["uniform", "logarithmic"] = "uniform"
+    """The same everywhere down to the ground, or that of the boundary layer, with the speeds above at a height."""
+    reference_height_m: Positive = 6.096
+    """That height, 20 ft, above the runway."""
+    roughness_m: Positive = 0.0457
+    """At and below which the air stands still, with ``logarithmic``: 0.15 ft (MIL-F-8785C, terminal flight phases)."""
+    shear_head_mps: _WindSpeed = 0.0
+    """By so much the head wind is stronger above a layer in which it changes evenly,"""
+    shear_cross_mps: _WindSpeed = 0.0
+    """and the cross wind."""
+    shear_low_m: Annotated[float, Field(ge=0.0)] = 20.0
+    """The layer's lower end, above the runway,"""
+    shear_high_m: Annotated[float, Field(ge=0.0)] = 50.0
+    """and its upper one."""
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if not self.roughness_m < self.reference_height_m:
+            told = f"must be below reference_height_m = {self.reference_height_m:g}, not {self.roughness_m:g}"
+            raise refused(told, "roughness_m")
+        if not self.shear_low_m < self.shear_high_m:
+            raise refused(
+                f"must be above shear_low_m = {self.shear_low_m:g}, not {self.shear_high_m:g}", "shear_high_m"
+            )
+        return self
+
+
+class TurbulenceConfig(Section):
+    """``[turbulence]``: Dryden's, by MIL-F-8785C."""
+
+    w20_mps: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
+    """Wind at 20 ft that its strength goes by: 15, 30, 45 kt (7.7, 15.4, 23.2 m/s) are light, moderate, severe."""
+
+
+class GustConfig(Section):
+    """``[gust]``: one discrete gust, ½ U (1 - cos(2π s/L)) along the way (CS-25.341)."""
+
+    head_mps: _WindSpeed = 0.0
+    """At its peak, against the landing direction,"""
+    cross_mps: _WindSpeed = 0.0
+    """towards the right"""
+    up_mps: _WindSpeed = 0.0
+    """and upwards."""
+    at_m: Annotated[float, Field(ge=-1e5, le=1e5)] = -300.0
+    """Where it begins, along the runway from the threshold."""
+    length_m: Positive = 150.0
+
+
+class AirConfig(Section):
+    """``[air]``: the standard atmosphere, and how the air differs from it; nobody on board is told of it."""
+
+    temperature_offset_c: Annotated[float, Field(ge=-80.0, le=60.0)] = 0.0
+    """Warmer by so much, at all heights."""
+    pressure_hpa: Annotated[float, Field(ge=800.0, le=1100.0)] = 1013.25
+    """At sea level."""
 
 
 class LoadingConfig(Section):

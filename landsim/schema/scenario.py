@@ -10,13 +10,16 @@ from landsim.schema.base import Section, refused
 from landsim.schema.dispersions import DispersionsConfig
 from landsim.schema.drawn import check_draw
 from landsim.schema.flight import (
+    AirConfig,
     AircraftChoice,
     ApproachConfig,
     BoxConfig,
+    GustConfig,
     LoadingConfig,
     RunwayConfig,
     SimulationConfig,
     StartConfig,
+    TurbulenceConfig,
     WindConfig,
 )
 from landsim.schema.plug_ins import PlugInsConfig
@@ -41,6 +44,9 @@ class ScenarioFile(Section):
     approach: ApproachConfig = Field(default_factory=ApproachConfig)
     start: StartConfig = Field(default_factory=StartConfig)
     wind: WindConfig = Field(default_factory=WindConfig)
+    turbulence: TurbulenceConfig = Field(default_factory=TurbulenceConfig)
+    gust: GustConfig = Field(default_factory=GustConfig)
+    air: AirConfig = Field(default_factory=AirConfig)
     loading: LoadingConfig = Field(default_factory=LoadingConfig)
     camera: CameraConfig = Field(default_factory=CameraConfig)
     imu: ImuConfig = Field(default_factory=ImuConfig)
