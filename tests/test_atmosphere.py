@@ -9,6 +9,7 @@ density               the gas law
 """
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -46,11 +47,13 @@ def theory(height_ft: float, w20: float) -> tuple[float, float, float, float]:
     return 0.1 * w20 / base**0.4, 0.1 * w20, height_ft / base**1.2 * FT, height_ft * FT
 
 
-@pytest.mark.parametrize("height_ft", [20.0, 100.0, 500.0])
+@pytest.mark.parametrize(
+    "height_ft", [100.0, pytest.param(20.0, marks=pytest.mark.slow), pytest.param(500.0, marks=pytest.mark.slow)]
+)
 def test_turbulence_is_drydens(height_ft: float) -> None:
-    """Within 5 % in rms and 1 dB in the spectrum from 0.05 to 5 rad/s, averaged in third octaves.
+    """Within 5 % in rms and 1 dB in the spectrum from 0.05 to 5 rad/s, averaged in quarters of a decade.
 
-    The longest of the series' correlation times is 14 s: of 150,000 s some ten thousand are independent.
+    A band holds seven frequencies or more of 45 half-overlapping windows: a standard deviation of 0.25 dB at most.
     """
     w20, airspeed, steps = 30.0 * KT, 40.0, 3_000_000
     horizontal, vertical, long, short = theory(height_ft, w20)
@@ -58,14 +61,14 @@ def test_turbulence_is_drydens(height_ft: float) -> None:
     assert np.std(wind, axis=0) == pytest.approx((horizontal, horizontal, vertical), rel=0.05)
     frequency, spectrum = welch(wind, 1.0 / DT, nperseg=2**17, axis=0)
     omega = 2.0 * np.pi * frequency
-    edges = np.geomspace(0.05, 5.0, 21)
+    edges = np.geomspace(0.05, 5.0, 9)
     for axis, (sigma, length) in enumerate(((horizontal, long), (horizontal, long), (vertical, short))):
         x = omega * length / airspeed
         if axis == 0:
             phi = sigma**2 * 2.0 * length / (np.pi * airspeed) / (1.0 + x**2)
         else:
             phi = sigma**2 * length / (np.pi * airspeed) * (1.0 + 3.0 * x**2) / (1.0 + x**2) ** 2
-        for low, high in zip(edges[:-1], edges[1:], strict=True):
+        for low, high in pairwise(edges):
             there = (omega >= low) & (omega < high)
             ratio = (spectrum[there, axis] / (2.0 * np.pi)).mean() / phi[there].mean()
             assert abs(10.0 * math.log10(ratio)) < 1.0, (axis, low)
@@ -99,8 +102,8 @@ def test_intensity_by_hand() -> None:
     assert tuple(at_top) == pytest.approx((2.0, 2.0, 304.8, 304.8), rel=1e-9)
     assert dryden(1000.0, 20.0) == at_top
     assert dryden(0.0, 20.0) == dryden(10.0 * FT, 20.0)
-    # 100 ft: 0.177 + 0.0823 = 0.2593; 0.2593^0.4 = 0.58284, 0.2593^1.2 = 0.19799
-    assert tuple(dryden(100.0 * FT, 20.0)) == pytest.approx((3.4315, 2.0, 153.95, 30.48), rel=1e-4)
+    # 100 ft: 0.177 + 0.0823 = 0.2593; 0.2593^0.4 = 0.58284, 0.2593^1.2 = 0.197954
+    assert tuple(dryden(100.0 * FT, 20.0)) == pytest.approx((3.4317, 2.0, 153.976, 30.48), rel=1e-4)
 
 
 def test_boundary_layer_by_hand() -> None:
@@ -160,14 +163,14 @@ def plant_in(gust: GustConfig, wind: WindConfig = NO_WIND, air: AirConfig | None
 )
 def test_a_gust_meets_the_aircraft_from_the_right_side(gust: dict[str, float], angle: str, sign: float) -> None:
     """An updraught raises the angle of attack; air that goes right comes from the left: negative sideslip, 3/40 rad."""
-    plant = plant_in(GustConfig(at_m=-1000.0, length_m=80.0, **gust))
+    plant = plant_in(GustConfig(at_m=-1000.0, length_m=8.0, **gust))
     before = plant._get(angle)
     for _ in range(120):
         truth = plant.step()
         change = plant._get(angle) - before
-        if truth.position[0] > -961.0:
+        if truth.position[0] > -996.0:  # at the peak, a tenth of a second later
             break
-    assert change * sign == pytest.approx(3.0 / 40.0, rel=0.35)
+    assert change * sign == pytest.approx(3.0 / 40.0, rel=0.2)
 
 
 def test_jsbsim_flies_through_the_wind_that_is_logged() -> None:
