@@ -46,6 +46,7 @@ def on_board(scenario: Scenario, seed: int) -> tuple[EstimatorSetup, ControllerS
         config=scenario.navigation,
         settings=deepcopy(plug_ins.estimator_settings or {}),
         rng=rngs[0],
+        latency=round(scenario.camera.latency_s * scenario.imu.rate_hz) / scenario.imu.rate_hz,
     )
     controller = ControllerSetup(
         aircraft=aircraft,

@@ -132,6 +132,8 @@ class Recorder:
         self._command_rows: list[int] = []
         self._frames: list[float] = []
         self._frame_rows: list[int] = []
+        self._update_rows: list[int] = []
+        self._faults: list[int] = []
         self._lines: list[Array] = []
         self._true_ends: list[Array] = []
         self._seen_ends: list[Array] = []
@@ -152,16 +154,34 @@ class Recorder:
         self._row += 1
         self._count += 1
 
+    @property
+    def row(self) -> int:
+        """The row of the step that has not been taken down yet."""
+        return self._count
+
     def frame(
-        self, view: View, result: FrameResult, running: InertialVisionFilter | Known | Belief | None, imu: Imu
+        self,
+        view: View,
+        result: FrameResult,
+        running: InertialVisionFilter | Known | Belief | None,
+        imu: Imu,
+        captured: int | None = None,
     ) -> None:
-        """Take down a camera frame."""
+        """Take down a camera frame, and what navigation made of it.
+
+        Parameters
+        ----------
+        captured : int, optional
+            Row in which it was captured, if that is not this one.
+        """
         update = result.update
         self._frames += (result.roll, result.late, update.degrees, update.nis, update.accepted, *result.lines())
         self._lines.append(view.frame.lines)
         self._true_ends.append(view.true_ends)
         self._seen_ends.append(view.seen_ends)
-        self._frame_rows.append(self._count)
+        self._frame_rows.append(self._count if captured is None else captured)
+        self._update_rows.append(self._count)
+        self._faults.append(view.fault)
         if running is not None:
             self._bias.append(running.bias)
             self._errors.append(imu.errors())
@@ -225,9 +245,10 @@ class Recorder:
         if self._command_rows and self._command_rows[-1] == self._count:
             del self._command_rows[-1]
             del self._commands[-len(Command._fields) - 2 :]
-        if self._frame_rows and self._frame_rows[-1] == self._count:
+        if self._update_rows and self._update_rows[-1] == self._count:
             del self._frames[-len(FRAME) :]
-            for frames in (self._frame_rows, self._lines, self._true_ends, self._seen_ends):
+            images = self._lines, self._true_ends, self._seen_ends, self._faults
+            for frames in (self._frame_rows, self._update_rows, *images):
                 del frames[-1]
         if self._filter_rows and self._filter_rows[-1] == self._count:
             for frames in (self._filter_rows, self._bias, self._errors, self._covariance):
@@ -248,13 +269,15 @@ class Recorder:
         """Columns that have a value at camera frames alone."""
         if not self._frame_rows:
             return
-        at = np.array(self._frame_rows)
+        at, update = np.array(self._frame_rows), np.array(self._update_rows)
         frame = _named(_columns(at.size, self._frames), FRAME)
         measured = frame["nis_dof"] > 0.0
         for name in ("nis_dof", "nis", "accepted"):
-            log[name][at[measured]] = frame[name][measured]
+            log[name][update[measured]] = frame[name][measured]
+        counts = np.diff(np.append(update, self._count))
         for name in ("lines_found", "lines_believed"):
-            log[name][at] = frame[name]
+            log[name][update[0] :] = np.repeat(frame[name], counts)
+        log["fault"][at] = self._faults
         true_ends, seen_ends = _stacked(self._true_ends), _stacked(self._seen_ends)
         for i, line in enumerate(LINES):
             for k, end in enumerate(ENDS):

@@ -23,6 +23,7 @@ from estimator.strapdown import ImuNoise, Site, ideal_sample_into, rows, unpacke
 from landsim.config import CameraConfig, ImuConfig, MountConfig, PitotConfig
 from landsim.earth import MEAN_RADIUS
 from landsim.runway import Runway
+from landsim.schema.grades import FLOOR
 from landsim.state import CameraFrame, ImuSample
 from landsim.truth import Truth
 from landsim.units import (
@@ -57,9 +58,22 @@ def camera_of(config: CameraConfig) -> PinholeCamera:
 def imu_noise(config: ImuConfig) -> ImuNoise:
     """The inertial unit's data sheet in SI, as the filter takes it.
 
-    A scale factor acts on gravity and so passes for an accelerometer bias: its share is added to the bias' sigma.
+    A scale factor acts on gravity and so passes for an accelerometer bias: its share is added to the bias' sigma.  So
+    is that of the bias' flicker, which over a flight drifts as a random walk does whose Allan deviation meets its floor
+    at `FLICKER_DRIFT_S`.
     """
     drift = 1.0 / math.sqrt(HOUR)
+    gyro_flicker = config.gyro_bias_instability_deg_h * DEG_PER_HOUR
+    accel_flicker = config.accel_bias_instability_mg * MILLI_G
+    if gyro_flicker > 0.0 or accel_flicker > 0.0:
+        walk = FLOOR * math.sqrt(3.0 / FLICKER_DRIFT_S)
+        plain = imu_noise(config.model_copy(update=dict.fromkeys(_INSTABILITIES, 0.0)))
+        return plain._replace(
+            gyro_drift=math.hypot(plain.gyro_drift, walk * gyro_flicker),
+            accel_drift=math.hypot(plain.accel_drift, walk * accel_flicker),
+            gyro_bias=math.hypot(plain.gyro_bias, flicker_sigma(gyro_flicker)),
+            accel_bias=math.hypot(plain.accel_bias, flicker_sigma(accel_flicker)),
+        )
     return ImuNoise(
         gyro=config.gyro_noise_deg_sqrt_h * DEG_PER_SQRT_HOUR,
         accel=config.accel_noise_mps_sqrt_h * MPS_PER_SQRT_HOUR,
@@ -70,8 +84,65 @@ def imu_noise(config: ImuConfig) -> ImuNoise:
     )
 
 
+_INSTABILITIES = ("gyro_bias_instability_deg_h", "accel_bias_instability_mg")
+FLICKER_TIMES = 0.1 * 4.0 ** np.arange(9)
+"""Correlation times of the processes that make up flicker noise, s: from a tenth of a second to two hours."""
+FLICKER_DRIFT_S = 20.0
+"""Half of a flight, about."""
+
+
+def flicker_sigma(instability: float) -> float:
+    """1 σ of flicker noise by its bias instability B, from one flight to the next.
+
+    First-order processes of the variance B² ln(r)/π each, their times apart by a factor r, add up to the one-sided
+    spectrum B²/(π f), whose Allan variance is 2 ln 2 B²/π (IEEE Std 952).
+    """
+    return instability * math.sqrt(math.log(4.0) / math.pi * FLICKER_TIMES.size)
+
+
+class Flicker:
+    """Flicker noise of six axes, a block of samples at a time.
+
+    Parameters
+    ----------
+    instability : (6,) array
+        B of each.
+    dt : float
+        Between samples, s.
+    rng : Generator
+    """
+
+    def __init__(self, instability: Array, dt: float, rng: Generator) -> None:
+        self._rng = rng
+        self._decay = np.exp(-dt / FLICKER_TIMES)
+        self._sigma = instability * math.sqrt(math.log(4.0) / math.pi)
+        self._state = rng.standard_normal((FLICKER_TIMES.size, 6))
+
+    def block(self, samples: int) -> Array:
+        """The next samples (n, 6)."""
+        total = np.zeros((samples, 6))
+        for i, decay in enumerate(self._decay.tolist()):
+            noise = math.sqrt(1.0 - decay * decay) * self._rng.standard_normal((samples, 6))
+            series = _first_order(noise, self._state[i], decay)
+            self._state[i] = series[-1]
+            total += series
+        return total * self._sigma
+
+
+@compiled
+def _first_order(noise: Array, start: Array, decay: float) -> Array:
+    """x_k = decay x_{k-1} + noise_k, of columns (n, m) that begin with x_{-1} = start (m,)."""
+    result = np.empty_like(noise)
+    for j in range(noise.shape[1]):
+        x = start[j]
+        for i in range(noise.shape[0]):
+            x = decay * x + noise[i, j]
+            result[i, j] = x
+    return result
+
+
 class Imu:
-    """The inertial unit, at the body's origin: bias, bias drift, white noise and scale factor.
+    """The inertial unit, at the body's origin: bias, bias drift and flicker, white noise and scale factor.
 
     Parameters
     ----------
@@ -82,7 +153,7 @@ class Imu:
     """
 
     def __init__(self, config: ImuConfig, site: Site, start: Truth, rng: Generator) -> None:
-        noise, factor = imu_noise(config), config.error_factor
+        noise, factor = imu_noise(config.model_copy(update=dict.fromkeys(_INSTABILITIES, 0.0))), config.error_factor
         self._dt = dt = 1.0 / config.rate_hz
         self._drift = factor * np.repeat((noise.gyro_drift, noise.accel_drift), 3) * math.sqrt(dt)
         self._white = factor * np.repeat((noise.gyro, noise.accel), 3) * math.sqrt(dt)
@@ -94,6 +165,10 @@ class Imu:
         self._rows = rows(6)
         self._count = 0
         self._last = self._last_bias.copy()
+        self._flicker: Flicker | None = None
+        if config.gyro_bias_instability_deg_h > 0.0 or config.accel_bias_instability_mg > 0.0:
+            gyro, accel = config.gyro_bias_instability_deg_h * DEG_PER_HOUR, config.accel_bias_instability_mg * MILLI_G
+            self._flicker = Flicker(factor * np.repeat((gyro, accel), 3), dt, rng)
         self._draw()
         self._before = start.motion
 
@@ -102,6 +177,8 @@ class Imu:
         drift, white = self._rng.standard_normal((2, BLOCK, 6))
         bias = self._last_bias + np.cumsum(drift * self._drift, axis=0)
         self._last_bias = bias[-1]
+        if self._flicker is not None:
+            bias = bias + self._flicker.block(BLOCK)
         self._errors = np.concatenate((bias, white * self._white), axis=1)
 
     def sample(self, truth: Truth) -> ImuSample:
@@ -222,6 +299,8 @@ class View(NamedTuple):
     that is not in the image."""
     seen_ends: Array
     """(3, 4): those ends moved onto the fitted lines; NaN for a line that is not reported."""
+    fault: int = 0
+    """Which line is missing or another one: 1 left edge, 2 threshold, 3 right edge; 0 for none."""
 
 
 class LineCamera:
@@ -247,29 +326,29 @@ class LineCamera:
         lens = (longer * fx, longer * fy, cx, cy)
         self._setup = np.array((*lens, camera.width, camera.height, config.near_m, config.min_line_px, *lever))
         self._corners = np.array((*runway.left_edge, *runway.right_edge))
-        self._spacing = _spacing(config.line_noise, config.point_spacing_px)
+        self._spacing = spacing_of(config.line_noise, config.point_spacing_px)
         self._rng = rng
         most = int(math.hypot(config.width_px, config.height_px) / config.point_spacing_px) + 3
         self._noise = np.empty(2 * LINES * most)
 
-    def view(self, truth: Truth, tilt: float, tilt_reading: float) -> View:
+    def view(self, truth: Truth, tilt: float, tilt_reading: float, _rate: Vec3 = (0.0, 0.0, 0.0)) -> View:
         """The image at an instant, with the true and the read mount angle (rad)."""
         ends, numbers, total = _ends(self._setup, self._corners, self._spacing, truth.motion, tilt)
         time = truth.time
         if self._outages and any(start <= time < end for start, end in self._outages):
             total = 0
         if total == 0:
-            return View(CameraFrame(time, _NO_LINES, tilt_reading), ends, _NO_ENDS)
+            return View(CameraFrame(time, NO_LINES, tilt_reading), ends, NO_ENDS)
         noise = self._rng.standard_normal(out=self._noise[: 2 * total])
         readings, seen = _fitted(ends, numbers, noise, self._noise_px)
         return View(CameraFrame(time, readings, tilt_reading), ends, seen)
 
 
-_NO_LINES = np.full((LINES, 7), np.nan)
-_NO_ENDS = np.full((LINES, 4), np.nan)
+NO_LINES = np.full((LINES, 7), np.nan)
+NO_ENDS = np.full((LINES, 4), np.nan)
 
 
-def _spacing(line_noise: str, spacing_px: float) -> float:
+def spacing_of(line_noise: str, spacing_px: float) -> float:
     """Between the points of a line, px."""
     return math.inf if line_noise == "endpoints" else spacing_px
 
@@ -285,7 +364,7 @@ def number_of_points(length_px: float, line_noise: str, spacing_px: float) -> in
     spacing_px : float
         Between the points, with ``edge-points``; they are spread a little wider to reach both ends.
     """
-    return _number_of_points(length_px, _spacing(line_noise, spacing_px))
+    return _number_of_points(length_px, spacing_of(line_noise, spacing_px))
 
 
 @compiled

@@ -6,6 +6,7 @@ from the navigation state, and the plant's own inner loops fly it until the next
 
 import math
 import time
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -15,6 +16,7 @@ from numpy.random import Generator, SeedSequence, default_rng
 from estimator.compiled import compiled, rotate
 from estimator.so3 import Array, Vec3
 from estimator.strapdown import unpacked
+from landsim.camera_errors import line_camera
 from landsim.config import Scenario
 from landsim.dispersion import dispersed, draws_of_seed
 from landsim.errors import InputError, traceback_of
@@ -27,7 +29,7 @@ from landsim.plugins import ControllerSetup, EstimatorSetup, PlugInFault, contro
 from landsim.recorder import Recorder
 from landsim.runway import Runway
 from landsim.scene import atmosphere_of, believed_width, loading_of, runway_of, wind_of
-from landsim.sensors import Imu, LineCamera, Pitot, TiltMount, camera_of, imu_noise, site_of
+from landsim.sensors import Imu, Pitot, TiltMount, View, camera_of, imu_noise, site_of
 from landsim.truth import InitialState, Truth
 from landsim.units import DEG
 
@@ -103,7 +105,12 @@ def fly(scenario: Scenario, seed: int = 0, draws: Mapping[str, float] | None = N
     scenario = dispersed(scenario, draws)
     aircraft = scenario.aircraft_config
     recorder = Recorder(
-        camera_of(scenario.camera), believed_width(scenario), mount_of(aircraft.mount), aircraft.gear.main_wheels_body_m
+        camera_of(scenario.camera),
+        believed_width(scenario),
+        mount_of(aircraft.mount),
+        aircraft.gear.main_wheels_body_m,
+        scenario.camera.pan_error_deg * DEG,
+        scenario.camera.roll_error_deg * DEG,
     )
     seeds = SeedSequence(seed).spawn(8)
     start = draw_start(scenario, default_rng(seeds[0]))
@@ -190,7 +197,10 @@ def _fly(
     imu = Imu(scenario.imu, site, truth, imu_rng)
     pitot = Pitot(scenario.pitot, dt, truth, pitot_rng, plant.density_ratio)
     mount = TiltMount(aircraft.mount, dt, mount_rng, scenario.camera.tilt_error_deg * DEG)
-    camera = LineCamera(scenario.camera, aircraft.mount.position_body_m, runway, camera_rng)
+    lever, chance = aircraft.mount.position_body_m, default_rng(seeds[5])
+    camera = line_camera(scenario.camera, scenario.fault, lever, runway, camera_rng, chance)
+    lag = imu_every * round(scenario.camera.latency_s * scenario.imu.rate_hz)
+    on_the_way: deque[tuple[int, View, int]] = deque()
     if scenario.navigation.start == "handover":
         handover = handed_over(truth, scenario.navigation, imu_noise(scenario.imu), default_rng(seeds[6]))
         estimator = replace(estimator, handover=handover)
@@ -214,10 +224,19 @@ def _fly(
                 rate, side_force = (x / imu_dt, y / imu_dt, z / imu_dt), side / imu_dt
         tilt_reading = mount.read()
         if step % frame_every == 0:
-            view = camera.view(truth, mount.tilt, tilt_reading)
+            view = camera.view(truth, mount.tilt, tilt_reading, rate)
+            if lag == 0:
+                result = navigator.observe(view.frame)
+                recorder.frame(view, result, navigator.known, imu)
+                diverged = navigator.diverged
+            else:
+                on_the_way.append((step + lag, view, recorder.row))
+        if on_the_way and on_the_way[0][0] == step:
+            _, view, row = on_the_way.popleft()
             result = navigator.observe(view.frame)
-            recorder.frame(view, result, navigator.known, imu)
+            recorder.frame(view, result, navigator.known, imu, row)
             diverged = navigator.diverged
+        if step % frame_every == 0:
             command, phase = guidance.guide(navigator.state(truth.time))
             recorder.command(command, phase, navigator.stage)
             plant.command(command)

@@ -58,7 +58,9 @@ def test_body_rate_is_less_bias_and_the_turning_earth() -> None:
     navigator = navigator_of(NavigationConfig())
     still = Inertial((0.0, 0.0, -9.0), (0.0, 0.0, 0.0), IDENTITY)
     bias = np.array((0.01, 0.02, -0.03, 0.0, 0.0, 0.0))
-    running = SimpleNamespace(bias=bias, nominal=still.numbers(), state=still, propagate=lambda *_: None)
+    running = SimpleNamespace(
+        bias=bias, nominal=still.numbers(), state=still, covariance=np.eye(15), propagate=lambda *_: None
+    )
     navigator.filter = cast("Any", running)
     navigator.propagate(np.array((0.001, 0.002, 0.003, 0.0, 0.0, 0.0)))
     # 0.1, 0.2, 0.3 rad/s as measured

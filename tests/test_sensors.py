@@ -219,7 +219,9 @@ def test_imu_errors_grow_by_their_factor() -> None:
         truth_at((40.0 * t, 0.0, -10.0), (3.0 * t, 2.0 * t, -5.0 * t), (40.0 + t, t, 0.5 * t)) for t in (0.0, 0.1)
     ]
     config, site = ImuConfig(), site_of(RUNWAY)
-    perfect = ImuConfig.model_validate(dict.fromkeys((k for k in ImuConfig.model_fields if k != "rate_hz"), 0.0))
+    perfect = ImuConfig.model_validate(
+        dict.fromkeys((k for k in ImuConfig.model_fields if k not in ("rate_hz", "grade")), 0.0)
+    )
     one, three, ideal = (
         Imu(c, site, states[0], default_rng(5)).sample(states[1])
         for c in (config, ImuConfig.model_validate({"error_factor": 3.0}), perfect)
@@ -238,7 +240,9 @@ def test_pitot_reads_too_much_by_its_error_of_scale() -> None:
 def test_imu_at_rest_feels_gravity_and_the_turning_earth() -> None:
     """At 45° north, heading north: 9.8062 m/s² upward, and ω (cos 45°, 0, -sin 45°)."""
     still = truth_at((0.0, 0.0, 0.0))
-    config = ImuConfig.model_validate(dict.fromkeys((k for k in ImuConfig.model_fields if k != "rate_hz"), 0.0))
+    config = ImuConfig.model_validate(
+        dict.fromkeys((k for k in ImuConfig.model_fields if k not in ("rate_hz", "grade")), 0.0)
+    )
     imu = Imu(config, site_of(RUNWAY), still, default_rng(0))
     sample = imu.sample(still)
     np.testing.assert_allclose(sample[3:] * 120.0, (0.0, 0.0, -9.80620), atol=1e-4)
@@ -269,7 +273,9 @@ def test_imu_errors_have_the_stated_size() -> None:
 def test_imu_reports_its_errors_as_the_filter_defines_them() -> None:
     """A sample less the ideal one is errors() × interval and white noise, and nothing else."""
     config = ImuConfig.model_validate({"gyro_noise_deg_sqrt_h": 0.0, "accel_noise_mps_sqrt_h": 0.0})
-    perfect = ImuConfig.model_validate(dict.fromkeys((k for k in ImuConfig.model_fields if k != "rate_hz"), 0.0))
+    perfect = ImuConfig.model_validate(
+        dict.fromkeys((k for k in ImuConfig.model_fields if k not in ("rate_hz", "grade")), 0.0)
+    )
     states = [
         truth_at((40.0 * t, 0.0, -10.0), (3.0 * t, 2.0 * t, -5.0 * t), (40.0 + t, t, 0.5 * t)) for t in (0.0, 0.1, 0.2)
     ]

@@ -46,7 +46,7 @@ from landsim.schema.flight import (
 )
 from landsim.schema.plug_ins import OWN, PlugInsConfig
 from landsim.schema.scenario import Scenario, ScenarioFile
-from landsim.schema.sensors import CameraConfig, ImuConfig, NavigationConfig, PitotConfig
+from landsim.schema.sensors import CameraConfig, FaultConfig, ImuConfig, NavigationConfig, PitotConfig
 from landsim.schema.study import BoundsConfig, StudyConfig
 
 __all__ = [
@@ -65,6 +65,7 @@ __all__ = [
     "CorrelationConfig",
     "DispersionsConfig",
     "DrawConfig",
+    "FaultConfig",
     "FlareGains",
     "GearConfig",
     "GuidanceConfig",

@@ -23,13 +23,18 @@ from landsim.schema.flight import (
     WindConfig,
 )
 from landsim.schema.plug_ins import PlugInsConfig
-from landsim.schema.sensors import CameraConfig, ImuConfig, NavigationConfig, PitotConfig
+from landsim.schema.sensors import CameraConfig, FaultConfig, ImuConfig, NavigationConfig, PitotConfig
 from landsim.schema.study import StudyConfig
 
 HIDDEN = (
     ("camera", "focal_length_error", 0.0),
     ("camera", "tilt_error_deg", 0.0),
     ("camera", "noise_factor", 1.0),
+    ("camera", "pan_error_deg", 0.0),
+    ("camera", "roll_error_deg", 0.0),
+    ("camera", "principal_u_error_px", 0.0),
+    ("camera", "principal_v_error_px", 0.0),
+    ("camera", "radial_distortion", 0.0),
     ("runway", "width_error_m", 0.0),
 )
 """Errors of the camera and the runway that navigation is not told of, and the values of none."""
@@ -49,6 +54,7 @@ class ScenarioFile(Section):
     air: AirConfig = Field(default_factory=AirConfig)
     loading: LoadingConfig = Field(default_factory=LoadingConfig)
     camera: CameraConfig = Field(default_factory=CameraConfig)
+    fault: FaultConfig = Field(default_factory=FaultConfig)
     imu: ImuConfig = Field(default_factory=ImuConfig)
     pitot: PitotConfig = Field(default_factory=PitotConfig)
     navigation: NavigationConfig = Field(default_factory=NavigationConfig)

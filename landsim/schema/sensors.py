@@ -1,11 +1,12 @@
 """The sensors, and what navigation makes of them."""
 
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from landsim.schema.base import LARGEST, NotNegative, Positive, Section, WindowS, refused, tuple_from_list
+from landsim.schema.grades import GRADES
 
 
 class CameraConfig(Section):
@@ -33,6 +34,26 @@ class CameraConfig(Section):
     """A shorter line is not reported."""
     near_m: Positive = 1.0
     """Depth of the near plane."""
+    pan_error_deg: Annotated[float, Field(ge=-45.0, le=45.0)] = 0.0
+    """By so much the optical axis points further to the right than the mount says: about the camera's own axis down."""
+    roll_error_deg: Annotated[float, Field(ge=-45.0, le=45.0)] = 0.0
+    """By so much the camera is turned about the optical axis, the right side down."""
+    principal_u_error_px: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0
+    """By so much the principal point lies further right than calibrated,"""
+    principal_v_error_px: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0
+    """and further down."""
+    radial_distortion: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
+    """What calibration left of it: a point at r focal lengths from the principal point is seen at r (1 + κ r²)."""
+    latency_s: Annotated[float, Field(ge=0.0, le=5.0)] = 0.0
+    """From the capture of an image to its lines, known on board; rounded to intervals of the inertial unit."""
+    dropped_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    """Of the frames, each lost by chance."""
+    exposure_s: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    """Motion blur: an edge that moves by b pixels meanwhile is smeared evenly, which adds b²/12 to the variance of its
+    points; the detector sees the smear and says so."""
+    visibility_m: Annotated[float, Field(gt=0.0, le=1e6)] = 1e6
+    """Fog: nothing beyond is seen, and contrast falls off as exp(-3 d/visibility) (Koschmieder's law, 5 % being the
+    least that is seen), by which the noise grows; the detector says so."""
     outages_s: Annotated[tuple[WindowS, ...], BeforeValidator(tuple_from_list)] = ()
     """Windows [from, to] of time in which no line is reported."""
 
@@ -47,9 +68,27 @@ class CameraConfig(Section):
         return self
 
 
+class FaultConfig(Section):
+    """``[fault]``: a line that is missing for a while, or another one in its place."""
+
+    kind: Literal["none", "missing", "wrong"] = "none"
+    line: Literal["left", "threshold", "right", "edge", "any"] = "edge"
+    """Which; of the edges, or of all three, each seed takes one."""
+    at_s: NotNegative = 8.0
+    """When it begins,"""
+    lasting_s: NotNegative = 3.0
+    """and for how long."""
+    offset_m: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 10.0
+    """A wrong edge lies so much further right on the ground, a wrong threshold so much further along,"""
+    angle_deg: Annotated[float, Field(ge=-80.0, le=80.0)] = 0.0
+    """and is turned clockwise, seen from above, about where the edge begins or the threshold has its middle."""
+
+
 class ImuConfig(Section):
     """``[imu]``: the one inertial unit; 1 σ each, drawn per seed and axis; a drift is a random walk."""
 
+    grade: Literal["custom", "consumer", "industrial", "tactical"] = "custom"
+    """All but ``custom`` put the numbers of such a unit, `landsim.schema.grades`, in place of the defaults below."""
     rate_hz: Annotated[float, Field(ge=1.0, le=10000.0)] = 120.0
     gyro_bias_deg_h: NotNegative = 10.0
     gyro_bias_drift_deg_h_sqrt_h: NotNegative = 3.0
@@ -61,10 +100,26 @@ class ImuConfig(Section):
     """mg after one hour."""
     accel_noise_mps_sqrt_h: NotNegative = 0.1
     """Velocity random walk."""
+    gyro_bias_instability_deg_h: NotNegative = 0.0
+    """Flicker of the bias: B of IEEE Std 952, whose Allan deviation has the floor 0.664 B."""
+    accel_bias_instability_mg: NotNegative = 0.0
     scale_factor: Annotated[float, Field(ge=0.0, lt=0.5)] = 3e-4
     """Relative, of each gyro and accelerometer."""
     error_factor: Annotated[float, Field(ge=0.0, le=100.0)] = 1.0
     """By which all these errors are greater than navigation believes, which is what the other keys say."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_its_grade(cls, given: Any) -> Any:
+        grade = given.get("grade") if isinstance(given, dict) else None
+        if not isinstance(grade, str) or grade not in GRADES:
+            return given
+        return GRADES[grade] | {key: x for key, x in given.items() if key == "grade" or x != _default(cls, key)}
+
+
+def _default(section: type[Section], key: str) -> Any:
+    field = section.model_fields.get(key)
+    return None if field is None else field.default
 
 
 class PitotConfig(Section):
