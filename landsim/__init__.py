@@ -45,6 +45,7 @@ A module imports from those below it only; a contract in the checks holds this.
 ``sensors``                          truth to measurements: camera lines, one IMU, pitot
 ``navigation``                       drives the estimator and its filter
 ``guidance``                         phases and commands, from the navigation state alone
+``go_around``                          when a landing is given up
 ``metrics``                          log to touchdown, tracking, navigation errors; pure
 ``scene``                            from a scenario's settings to its runway and its aircraft's incidence
 ``config``, ``schema``               TOML to frozen, validated models

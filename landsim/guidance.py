@@ -1,7 +1,8 @@
 """Guidance: glide slope and localizer, flare, touchdown and rollout.  Pure: (navigation state, phase) to command.
 
-The phases follow one another and never go back: acquire, approach, flare, rollout, stopped.  Everything that is carried
-from one call to the next is in `GuidanceState`.
+The phases follow one another and never go back: acquire, approach, flare, rollout, stopped; from approach or flare, a
+landing that is given up leads to the go-around and to nothing else.  Everything that is carried from one call to the
+next is in `GuidanceState`.
 """
 
 import math
@@ -9,7 +10,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from estimator.so3 import Vec3, rotate
-from landsim.config import AircraftConfig, ApproachConfig
+from landsim.config import AircraftConfig, ApproachConfig, GoAroundConfig
+from landsim.go_around import NO_DOUBT, Doubt, doubt_of, doubted, gives_up
 from landsim.state import Command, NavState, Phase
 from landsim.units import DEG
 
@@ -61,9 +63,18 @@ class Law:
     tilt_rollout: float
     half_view: float
     """From the optical axis to the image's lower edge, rad."""
+    go_around: GoAroundConfig | None = None
+    """When the landing is given up; None where it never is."""
 
 
-def law_of(aircraft: AircraftConfig, approach: ApproachConfig, gravity: float, half_view: float, dt: float) -> Law:
+def law_of(
+    aircraft: AircraftConfig,
+    approach: ApproachConfig,
+    gravity: float,
+    half_view: float,
+    dt: float,
+    go_around: GoAroundConfig | None = None,
+) -> Law:
     """The law of an aircraft's gains on an approach."""
     a, f, r = aircraft.guidance.approach, aircraft.guidance.flare, aircraft.guidance.rollout
     return Law(
@@ -104,6 +115,7 @@ def law_of(aircraft: AircraftConfig, approach: ApproachConfig, gravity: float, h
         tilt_late=aircraft.mount.tilt_late_deg * DEG,
         tilt_rollout=aircraft.mount.tilt_rollout_deg * DEG,
         half_view=half_view,
+        go_around=go_around if go_around is not None and go_around.enabled else None,
     )
 
 
@@ -122,6 +134,8 @@ class GuidanceState(NamedTuple):
     """Since touchdown, s."""
     tilted: bool
     """The mount has been told to tilt for the late stage: in the air it is not told back."""
+    doubt: Doubt = NO_DOUBT
+    """Against the landing; that for which it was given up, once it was."""
 
 
 INITIAL = GuidanceState(Phase.ACQUIRE, 0.0, 0.0, 0.0, False)
@@ -165,6 +179,10 @@ def guide(law: Law, nav: NavState, state: GuidanceState) -> tuple[Command, Guida
     Command, GuidanceState
     """
     phase = next_phase(law, nav, state.phase)
+    if law.go_around is not None and (phase is _APPROACH or phase is _FLARE):
+        phase, state = _reconsidered(law, law.go_around, nav, phase, state)
+    if phase is _GO_AROUND:
+        return _climb(law, nav, state)
     if phase is _ACQUIRE:
         return _HANDS_OFF._replace(airspeed=law.approach_speed, tilt=law.tilt_early), state
     if phase is _ROLLOUT or phase is _STOPPED:
@@ -184,6 +202,11 @@ def threshold_leaves(law: Law, nav: NavState) -> bool:
     return below_horizon > law.half_view + law.tilt_early - nav.pitch
 
 
+def above_slope(law: Law, nav: NavState) -> float:
+    """Of the centre of gravity above the glide slope, m."""
+    return -nav.position[2] - (law.aim_point - nav.position[0]) * law.slope
+
+
 def _within(least: float, value: float, most: float) -> float:
     """The value, held between two limits; `most` for one that is not a number."""
     return (least if value < least else value) if value < most else most
@@ -196,8 +219,7 @@ def _descend(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tup
     if flare:
         wanted = (max(wheel_height(law, nav), 0.0) + law.flare_bias) / law.flare_time
     else:
-        above = -nav.position[2] - (law.aim_point - nav.position[0]) * law.slope
-        wanted = speed * law.slope + law.height_gain * above
+        wanted = speed * law.slope + law.height_gain * above_slope(law, nav)
     wanted = _within(-law.max_sink, wanted, law.max_sink)
     error = sink - wanted
     integral = _within(-law.integral_max, state.sink_integral + error * law.dt, law.integral_max)
@@ -216,7 +238,49 @@ def _descend(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tup
         brake=0.0,
         tilt=law.tilt_late if tilted else law.tilt_early,
     )
-    return command, GuidanceState(phase, integral, pitch, 0.0, tilted)
+    return command, GuidanceState(phase, integral, pitch, 0.0, tilted, state.doubt)
+
+
+def _reconsidered(
+    law: Law, limits: GoAroundConfig, nav: NavState, phase: Phase, state: GuidanceState
+) -> tuple[Phase, GuidanceState]:
+    height = wheel_height(law, nav)
+    above = math.nan if phase is _FLARE else above_slope(law, nav)
+    doubt = doubted(state.doubt, doubt_of(limits, nav, height, above), height, law.dt)
+    return _GO_AROUND if gives_up(limits, doubt) else phase, state._replace(doubt=doubt)
+
+
+CLIMB_ANGLE = 3.0 * DEG
+"""Climb that is asked for at the approach speed,"""
+CLIMB_PER_SPEED = 1.5 * DEG
+"""more or less by so much per m/s of airspeed above or below it,"""
+CLIMB_MAX = 6.0 * DEG
+"""and at most; at least none."""
+CLIMB_BANK = 5.0 * DEG
+"""Most bank in the climb: it keeps the track along the runway, not the place beside it."""
+FULL_THROTTLE = 15.0
+"""Above the approach speed, m/s: so fast the throttle is told to become, which opens it fully."""
+
+
+def _climb(law: Law, nav: NavState, state: GuidanceState) -> tuple[Command, GuidanceState]:
+    """Full throttle, wings near level, along the runway; airspeed is held by the climb."""
+    excess = nav.airspeed - law.approach_speed
+    climb = _within(0.0, CLIMB_ANGLE + CLIMB_PER_SPEED * excess, CLIMB_MAX)
+    alpha = law.trim_alpha + law.trim_alpha_slope * max(excess, -0.5 * law.approach_speed)
+    pitch = _within(law.pitch_min, alpha + climb, law.pitch_max)
+    bank = math.atan(-law.bank_gain * nav.velocity[1] / law.gravity)
+    command = Command(
+        engaged=True,
+        pitch=pitch,
+        roll=_within(-CLIMB_BANK, bank, CLIMB_BANK),
+        airspeed=law.approach_speed + FULL_THROTTLE,
+        idle=False,
+        ground=False,
+        steering=0.0,
+        brake=0.0,
+        tilt=law.tilt_late if state.tilted else law.tilt_early,
+    )
+    return command, state._replace(phase=_GO_AROUND, pitch=pitch)
 
 
 def bank_command(law: Law, cross: float, cross_speed: float) -> float:
@@ -256,4 +320,4 @@ def _rollout(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tup
         brake=law.brake if time > law.brake_delay else 0.0,
         tilt=law.tilt_rollout,
     )
-    return command, GuidanceState(phase, state.sink_integral, pitch, time, state.tilted)
+    return command, GuidanceState(phase, state.sink_integral, pitch, time, state.tilted, state.doubt)

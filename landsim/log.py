@@ -75,7 +75,7 @@ def _ends(kind: str, what: str) -> list[Column]:
 
 COLUMNS: tuple[Column, ...] = (
     Column("time_s", "s", "", "time since the start"),
-    Column("phase", "", "", "landsim.state.Phase: 0 acquire, 1 approach, 2 flare, 3 rollout, 4 stopped"),
+    Column("phase", "", "", "landsim.state.Phase: 0 acquire, 1 approach, 2 flare, 3 rollout, 4 stopped, 5 go-around"),
     Column("stage", "", "", "landsim.state.Stage of the last frame: 0 none, 1 early, 2 late"),
     *_pose(),
     # the body

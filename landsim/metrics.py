@@ -23,6 +23,7 @@ Log: TypeAlias = Mapping[str, Array]
 
 ENDS = (
     "stopped", "touchdown", "timeout", "diverged", "trim_failed", "error", "structure_contact", "below_ground", "fault",
+    "go_around",
 )  # fmt: skip
 """Why the simulation loop ended."""
 CRASHES = {
@@ -187,6 +188,8 @@ def judge(
     if end == "timeout":
         where = "in the air" if touchdown is None else "still rolling"
         return Verdict("timeout", f"{where} at the time limit of {scenario.simulation.time_limit_s:g} s")
+    if end == "go_around":
+        return Verdict("go_around", f"gone around: {detail}" if detail else "gone around")
     if end == "fault":
         return Verdict("error", "the loop ended for a fault at the wheels that the log does not show")
     if touchdown is None:
@@ -414,7 +417,9 @@ def _contact_faults(
         faults.append((touchdown.row, Verdict("crashed", text)))
     x, y = (values[touchdown.row :] for values in main_wheels(log, aircraft))
     on_it = (x >= 0.0) & (x <= scenario.runway.length_m) & (np.abs(y) <= 0.5 * scenario.runway.width_m)
-    off = np.flatnonzero(~on_it)
+    # a wheel that touched while the aircraft was going around says nothing of where it flies afterwards
+    climbing = (log["phase"] == Phase.GO_AROUND) & ~_on_mains(log)
+    off = np.flatnonzero(~(on_it | climbing[touchdown.row :]))
     if off.size:
         first = int(off[0])
         what = "touched down" if first == 0 else "rolled"

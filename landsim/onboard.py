@@ -57,5 +57,6 @@ def on_board(scenario: Scenario, seed: int) -> tuple[EstimatorSetup, ControllerS
         dt=frame_dt,
         settings=deepcopy(plug_ins.controller_settings or {}),
         rng=rngs[1],
+        go_around=scenario.go_around,
     )
     return estimator, controller

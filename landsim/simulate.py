@@ -30,6 +30,7 @@ from landsim.recorder import Recorder
 from landsim.runway import Runway
 from landsim.scene import atmosphere_of, believed_width, loading_of, runway_of, wind_of
 from landsim.sensors import Imu, Pitot, TiltMount, View, camera_of, imu_noise, site_of
+from landsim.state import Phase
 from landsim.truth import InitialState, Truth
 from landsim.units import DEG
 
@@ -213,6 +214,7 @@ def _fly(
     standing = 0.0
     diverged: str | None = None
     faulty, mains_down = math.inf, False
+    phase, climbed = Phase.ACQUIRE, scenario.go_around.end_height_m
     for step in range(limit):
         airspeed = pitot.sample(truth)
         if step % imu_every == 0:
@@ -241,7 +243,10 @@ def _fly(
             recorder.command(command, phase, navigator.stage)
             plant.command(command)
         recorder.step(truth, navigator, airspeed, mount.tilt, tilt_reading)
-        if diverged is not None:
+        if phase is Phase.GO_AROUND:
+            if -truth.motion.item(2) >= climbed:
+                return End("go_around", guidance.reason)
+        elif diverged is not None:
             return End("diverged", diverged)
         if truth.wow_nose or truth.wow_left or truth.wow_right:
             if faulty == math.inf:
@@ -249,7 +254,7 @@ def _fly(
             mains_down = mains_down or truth.wow_left or truth.wow_right
             if truth.time > faulty + AFTERMATH:
                 return End("fault")
-            if mains_down and settings.end == "touchdown" and faulty == math.inf:
+            if mains_down and settings.end == "touchdown" and faulty == math.inf and phase is not Phase.GO_AROUND:
                 return End("touchdown")
         standing = standing + dt if truth.wow_left and stands(truth) else 0.0
         if standing > STANDSTILL_TIME:

@@ -380,7 +380,7 @@ def test_the_airspeed_command_is_that_of_the_approach(flight: dict[str, Array]) 
     phase = np.interp(time, flight["time_s"], flight["phase"])
     np.testing.assert_array_equal(np.isfinite(shown), phase == 1.0)
     names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert [name.split()[-1] for name in names] == ["acquire", "approach", "flare", "rollout", "stopped"]
+    assert [name.split()[-1] for name in names] == ["acquire", "approach", "flare", "rollout", "stopped", "go_around"]
 
 
 def test_a_crash_is_marked_and_ends_the_pictures(flight: dict[str, Array]) -> None:

@@ -41,6 +41,7 @@ PHASE_SHADES = {
     Phase.FLARE: "#dceaf5",
     Phase.ROLLOUT: "#f7ead2",
     Phase.STOPPED: "#e3d2ae",
+    Phase.GO_AROUND: "#e8d9ea",
 }
 HEAD, ROW, FOOT = 1.13, 1.64, 0.49
 """Of the figure: its head, a row of panels with what is between them, what is below; inches."""

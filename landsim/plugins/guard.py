@@ -318,6 +318,11 @@ class GuardedController:
         self._guard = Guard(who)
         self._plug_in = plug_in
 
+    @property
+    def reason(self) -> str:
+        """Why the landing was given up: the plug-in's optional ``reason``."""
+        return str(getattr(self._plug_in, "reason", ""))
+
     def guide(self, nav: NavState) -> tuple[Command, Phase]:
         """As `Controller.guide`."""
         guard = self._guard

@@ -12,7 +12,7 @@ from estimator.camera import PinholeCamera
 from estimator.mount import Mount
 from estimator.so3 import IDENTITY, Array, Vec3, flat, to_euler
 from estimator.strapdown import ImuNoise, Site
-from landsim.config import AircraftConfig, ApproachConfig, NavigationConfig
+from landsim.config import AircraftConfig, ApproachConfig, GoAroundConfig, NavigationConfig
 from landsim.navigation import FrameResult
 from landsim.state import CameraFrame, Command, ImuSample, NavState, Phase, Stage
 
@@ -91,6 +91,8 @@ class ControllerSetup:
         The scenario's ``[plug-ins.controller_settings]``; empty without them.
     rng : numpy.random.Generator
         Its numbers come from the flight's seed.
+    go_around : GoAroundConfig
+        The scenario's ``[go_around]``.  A flight that is in `Phase.GO_AROUND` is over at its end height.
     """
 
     aircraft: AircraftConfig
@@ -101,6 +103,7 @@ class ControllerSetup:
     dt: float
     settings: Mapping[str, Any]
     rng: Generator
+    go_around: GoAroundConfig = GoAroundConfig()  # noqa: RUF009 - frozen
 
 
 class Estimator(Protocol):
@@ -174,7 +177,10 @@ class Estimator(Protocol):
 
 
 class Controller(Protocol):
-    """Guidance: from the navigation state to a command."""
+    """Guidance: from the navigation state to a command.
+
+    ``reason``, a str, is optional: why it went around.
+    """
 
     def guide(self, nav: NavState) -> tuple[Command, Phase]:
         """Steer; called once before the first measurement, then after each camera frame.

@@ -44,10 +44,15 @@ class OwnController:
     def __init__(self, setup: ControllerSetup) -> None:
         camera = setup.camera
         half_view = math.atan((camera.height - 0.5 - camera.cy) / camera.fy)
-        self.law = law_of(setup.aircraft, setup.approach, setup.gravity, half_view, setup.dt)
+        self.law = law_of(setup.aircraft, setup.approach, setup.gravity, half_view, setup.dt, setup.go_around)
         self.memory = INITIAL
 
     def guide(self, nav: NavState) -> tuple[Command, Phase]:
         """As `Controller.guide`."""
         command, self.memory = guide(self.law, nav, self.memory)
         return command, self.memory.phase
+
+    @property
+    def reason(self) -> str:
+        """Why the landing was given up; empty while it was not."""
+        return self.memory.doubt.reason

@@ -45,6 +45,38 @@ class ApproachConfig(Section):
     """Where the glide slope meets the runway, past the threshold."""
 
 
+class GoAroundConfig(Section):
+    """``[go_around]``: when a landing is given up, judged by the navigation state, and how far it then climbs.
+
+    The limits are ESTIMATES, scaled to a runway 30 m wide: half its width less half the track and a margin.
+    """
+
+    enabled: bool = False
+    decision_height_m: Positive = 30.0
+    """Of the main wheels, from which down the landing is judged without pause,"""
+    commit_height_m: NotNegative = 2.0
+    """and below which it is gone on with."""
+    lateral_limit_m: Positive = 10.0
+    """Greatest lateral protection level,"""
+    vertical_limit_m: Positive = 5.0
+    """and vertical one."""
+    cross_limit_m: Positive = 8.0
+    """Greatest distance from the centreline,"""
+    slope_limit_m: Positive = 6.0
+    """and, until the flare, from the glide slope."""
+    confirm_s: NotNegative = 0.3
+    """So long a reason has to last."""
+    end_height_m: Positive = 60.0
+    """Of the centre of gravity, at which the flight is over."""
+
+    @model_validator(mode="after")
+    def _heights_in_order(self) -> Self:
+        if not self.commit_height_m < self.decision_height_m:
+            told = f"must be below decision_height_m = {self.decision_height_m:g}, not {self.commit_height_m:g}"
+            raise refused(told, "commit_height_m")
+        return self
+
+
 class StartConfig(Section):
     """``[start]``: the centre of gravity at the start, and the σ of what each seed adds, unknown to navigation."""
 

@@ -14,6 +14,7 @@ from landsim.schema.flight import (
     AircraftChoice,
     ApproachConfig,
     BoxConfig,
+    GoAroundConfig,
     GustConfig,
     LoadingConfig,
     RunwayConfig,
@@ -58,6 +59,7 @@ class ScenarioFile(Section):
     imu: ImuConfig = Field(default_factory=ImuConfig)
     pitot: PitotConfig = Field(default_factory=PitotConfig)
     navigation: NavigationConfig = Field(default_factory=NavigationConfig)
+    go_around: GoAroundConfig = Field(default_factory=GoAroundConfig)
     simulation: SimulationConfig = Field(default_factory=SimulationConfig)
     box: BoxConfig = Field(default_factory=BoxConfig)
     plug_ins: PlugInsConfig = Field(default_factory=PlugInsConfig, alias="plug-ins")

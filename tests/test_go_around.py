@@ -1,0 +1,70 @@
+"""The landing is given up for a reason that lasts, between two heights, and then the aircraft climbs out."""
+
+import math
+
+import pytest
+
+import landsim
+from landsim.go_around import NO_DOUBT, Doubt, doubt_of, doubted, gives_up
+from landsim.plugins import nav_state
+from landsim.schema.flight import GoAroundConfig
+from landsim.state import Alarm, NavState, Stage
+
+LIMITS = GoAroundConfig(enabled=True)
+GOOD = nav_state(1.0, (-300.0, 1.0, -25.0), (39.0, 0.0, 2.0), (1, 0, 0, 0, 1, 0, 0, 0, 1), (0, 0, 0), 40.0, Stage.LATE)
+GOOD = GOOD._replace(lateral_protection=3.0, vertical_protection=2.0)
+
+
+@pytest.mark.parametrize(
+    ("nav", "above", "told"),
+    [
+        (GOOD, 0.5, ""),
+        (GOOD._replace(lateral_protection=math.nan, vertical_protection=math.nan), 0.5, ""),
+        (GOOD._replace(alarm=Alarm.WRONG_LINE), 0.5, ""),  # it is left out, and what is left is judged
+        (GOOD._replace(alarm=Alarm.UNAIDED), 0.5, "no line"),
+        (GOOD._replace(alarm=Alarm.INCONSISTENT), 0.5, "contradict"),
+        (GOOD._replace(lateral_protection=10.1), 0.5, "lateral protection"),
+        (GOOD._replace(vertical_protection=5.1), 0.5, "vertical protection"),
+        (GOOD._replace(position=(-300.0, -8.1, -25.0)), 0.5, "centreline"),
+        (GOOD, -6.1, "glide slope"),
+        (GOOD, math.nan, ""),
+    ],
+)
+def test_each_limit_has_its_reason(nav: NavState, above: float, told: str) -> None:
+    reason = doubt_of(LIMITS, nav, 20.0, above)
+    assert (told in reason) if told else reason == ""
+
+
+@pytest.mark.parametrize(("height", "judged"), [(30.1, False), (30.0, True), (2.1, True), (2.0, False)])
+def test_it_is_judged_between_decision_and_commitment(height: float, judged: bool) -> None:
+    assert bool(doubt_of(LIMITS, GOOD._replace(alarm=Alarm.UNAIDED), height, 0.0)) is judged
+
+
+def test_a_reason_has_to_last() -> None:
+    doubt, calls = NO_DOUBT, 0
+    while not gives_up(LIMITS, doubt):
+        doubt, calls = doubted(doubt, "fog", 20.0, 0.1), calls + 1
+    assert calls == pytest.approx(3, abs=1)  # 0.3 s of tenths, which are not exact
+    assert doubted(doubt, "", 20.0, 0.1) == NO_DOUBT
+    assert not gives_up(LIMITS, Doubt("", 9.0))
+
+
+def test_blinded_before_the_decision_height_it_climbs_out() -> None:
+    blind = {
+        "navigation.aiding": "lines", "go_around.enabled": True, "camera.outages_s": [[14.0, 60.0]],
+    }  # fmt: skip
+    flight = landsim.fly(landsim.load_scenario("landing", overrides=blind), seed=1)
+    assert flight.metrics["outcome"] == flight.metrics["end"] == "go_around"
+    assert "no line has been believed" in flight.metrics["reason"]
+    assert not flight.metrics["in_box"]
+    height, up = flight.log["body_height_m"], flight.log["phase"] == 5.0
+    assert height[-1] >= 60.0
+    assert height.min() > 20.0
+    # wings near level, and an airspeed far from the stall, which is at 29 m/s
+    assert abs(flight.log["body_roll_deg"][up]).max() < 6.0
+    assert flight.log["true_airspeed_mps"].min() > 35.0
+
+
+def test_the_heights_are_in_order() -> None:
+    with pytest.raises(ValueError, match="commit_height_m"):
+        landsim.load_scenario("landing", overrides={"go_around.commit_height_m": 31.0})
