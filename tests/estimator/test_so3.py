@@ -51,7 +51,8 @@ def test_log_between_is_scipys(angle: float) -> None:
         axis = rng.normal(size=3)
         vector = angle * axis / np.linalg.norm(axis)
         b = a * Rotation.from_rotvec(vector)
-        assert so3.log_between(matrix(a), matrix(b)) == pytest.approx(vector, abs=1e-15)
+        # at 2.5 rad the logarithm's slope, angle / sin(angle), makes four of a rounding error of the product
+        assert so3.log_between(matrix(a), matrix(b)) == pytest.approx(vector, abs=4e-15 if angle > 1.0 else 1e-15)
 
 
 def test_euler_angles_are_scipys() -> None:
