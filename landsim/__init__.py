@@ -45,7 +45,8 @@ A module imports from those below it only; a contract in the checks holds this.
 ``sensors``                          truth to measurements: camera lines, one IMU, pitot
 ``navigation``                       drives the estimator and its filter
 ``guidance``                         phases and commands, from the navigation state alone
-``go_around``                          when a landing is given up
+``go_around``, ``wind_law``          when a landing is given up; what is flown besides in wind
+``omniscient``                       the true state in place of navigation's, for comparison
 ``metrics``                          log to touchdown, tracking, navigation errors; pure
 ``scene``                            from a scenario's settings to its runway and its aircraft's incidence
 ``config``, ``schema``               TOML to frozen, validated models

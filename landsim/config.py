@@ -51,6 +51,7 @@ from landsim.schema import (
     StudyConfig,
     TurbulenceConfig,
     WindConfig,
+    WindGains,
     field_names,
     fields_by_key,
 )
@@ -91,6 +92,7 @@ __all__ = [
     "StudyConfig",
     "TurbulenceConfig",
     "WindConfig",
+    "WindGains",
     "load_aircraft",
     "load_scenario",
     "parse_setting",
@@ -143,11 +145,15 @@ def load_scenario(name_or_path: str | Path, overrides: Mapping[str, object] | No
     if not is_text(name):
         raise ScenarioError(f"{_where('aircraft.name', path, overrides)}: must be UTF-8 text, not {name}")
     sections = {key: getattr(settings, field) for key, field in fields_by_key(ScenarioFile).items()}
+    aircraft = _aircraft_in(folder)
+    if settings.approach.law == "wind" and aircraft.guidance.wind is None:
+        where = _where("approach.law", path, overrides)
+        raise ScenarioError(f'{where}: must be "calm": {aircraft.name} has no [guidance.wind] in {AIRCRAFT_FILE}')
     return Scenario(
         **{**sections, "aircraft": AircraftChoice(name=name)},
         name=path.stem,
         path=path,
-        aircraft_config=_aircraft_in(folder),
+        aircraft_config=aircraft,
     )
 
 

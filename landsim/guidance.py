@@ -14,6 +14,18 @@ from landsim.config import AircraftConfig, ApproachConfig, GoAroundConfig
 from landsim.go_around import NO_DOUBT, Doubt, doubt_of, doubted, gives_up
 from landsim.state import Command, NavState, Phase
 from landsim.units import DEG
+from landsim.wind_law import (
+    NO_WIND,
+    WindLaw,
+    WindMemory,
+    airspeed_added,
+    align_rudder,
+    aligned,
+    felt,
+    kept_left,
+    steered,
+    wind_law_of,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +77,8 @@ class Law:
     """From the optical axis to the image's lower edge, rad."""
     go_around: GoAroundConfig | None = None
     """When the landing is given up; None where it never is."""
+    wind: WindLaw | None = None
+    """What is flown besides in wind."""
 
 
 def law_of(
@@ -76,7 +90,10 @@ def law_of(
     go_around: GoAroundConfig | None = None,
 ) -> Law:
     """The law of an aircraft's gains on an approach."""
-    a, f, r = aircraft.guidance.approach, aircraft.guidance.flare, aircraft.guidance.rollout
+    gains = aircraft.guidance
+    a, f, r, wind = gains.approach, gains.flare, gains.rollout, gains.wind if approach.law == "wind" else None
+    if approach.law == "wind" and wind is None:
+        raise ValueError(f"{aircraft.name} has no [guidance.wind]")
     return Law(
         dt=dt,
         gravity=gravity,
@@ -86,19 +103,19 @@ def law_of(
         trim_alpha=a.trim_alpha_deg * DEG,
         trim_alpha_slope=a.trim_alpha_slope_deg_per_mps * DEG,
         height_gain=a.height_gain_per_s,
-        pitch_gain=a.pitch_gain_rad_per_mps,
+        pitch_gain=a.pitch_gain_rad_per_mps if wind is None else wind.pitch_gain_rad_per_mps,
         pitch_integral=a.pitch_integral_rad_per_m,
         integral_max=a.pitch_integral_max_deg * DEG / max(a.pitch_integral_rad_per_m, 1e-9),
         max_sink=a.max_sink_mps,
         pitch_min=a.pitch_min_deg * DEG,
         pitch_max=a.pitch_max_deg * DEG,
-        lateral_gain=a.lateral_gain_per_s,
+        lateral_gain=a.lateral_gain_per_s if wind is None else wind.lateral_gain_per_s,
         lateral_speed_max=a.lateral_speed_max_mps,
-        bank_gain=a.bank_gain_per_s,
+        bank_gain=a.bank_gain_per_s if wind is None else wind.bank_gain_per_s,
         bank_max=a.bank_max_deg * DEG,
         flare_height=f.height_m,
-        flare_time=f.time_constant_s,
-        flare_bias=f.height_bias_m,
+        flare_time=f.time_constant_s if wind is None else wind.flare_time_constant_s,
+        flare_bias=f.height_bias_m if wind is None else wind.flare_height_bias_m,
         touchdown_height=f.touchdown_height_m,
         lower_rate=r.pitch_rate_deg_s * DEG,
         rollout_pitch=r.pitch_deg * DEG,
@@ -116,6 +133,7 @@ def law_of(
         tilt_rollout=aircraft.mount.tilt_rollout_deg * DEG,
         half_view=half_view,
         go_around=go_around if go_around is not None and go_around.enabled else None,
+        wind=None if wind is None else wind_law_of(wind),
     )
 
 
@@ -136,6 +154,7 @@ class GuidanceState(NamedTuple):
     """The mount has been told to tilt for the late stage: in the air it is not told back."""
     doubt: Doubt = NO_DOUBT
     """Against the landing; that for which it was given up, once it was."""
+    wind: WindMemory = NO_WIND
 
 
 INITIAL = GuidanceState(Phase.ACQUIRE, 0.0, 0.0, 0.0, False)
@@ -216,8 +235,12 @@ def _descend(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tup
     flare = phase is _FLARE
     tilted = state.tilted or threshold_leaves(law, nav)
     speed, sink = nav.velocity[0], nav.velocity[2]
+    wind = law.wind
+    least = law.pitch_min if wind is None or not flare else wind.flare_pitch_min
     if flare:
         wanted = (max(wheel_height(law, nav), 0.0) + law.flare_bias) / law.flare_time
+        if wind is not None:  # against a head wind the slope's own sink rate may be less
+            wanted = min(wanted, max(speed * law.slope, law.flare_bias / law.flare_time))
     else:
         wanted = speed * law.slope + law.height_gain * above_slope(law, nav)
     wanted = _within(-law.max_sink, wanted, law.max_sink)
@@ -226,11 +249,11 @@ def _descend(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tup
     airspeed = max(nav.airspeed, 0.5 * law.approach_speed)
     alpha = law.trim_alpha + law.trim_alpha_slope * (airspeed - law.approach_speed)
     pitch = alpha - wanted / airspeed + law.pitch_gain * error + law.pitch_integral * integral
-    pitch = _within(law.pitch_min, pitch, law.pitch_max)
+    pitch = _within(least, pitch, law.pitch_max)
     command = Command(
         engaged=True,
         pitch=pitch,
-        roll=bank_command(law, nav.position[1], nav.velocity[1]),
+        roll=bank_command(law, nav.position[1], nav.velocity[1]) if wind is None else 0.0,
         airspeed=law.approach_speed,
         idle=flare,
         ground=False,
@@ -238,7 +261,28 @@ def _descend(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tup
         brake=0.0,
         tilt=law.tilt_late if tilted else law.tilt_early,
     )
-    return command, GuidanceState(phase, integral, pitch, 0.0, tilted, state.doubt)
+    memory = state.wind
+    if wind is not None:
+        command, memory = _against_wind(law, wind, nav, flare, command, memory)
+    return command, GuidanceState(phase, integral, pitch, 0.0, tilted, state.doubt, memory)
+
+
+def _against_wind(
+    law: Law, wind: WindLaw, nav: NavState, flare: bool, command: Command, memory: WindMemory
+) -> tuple[Command, WindMemory]:
+    """A command of the descent, with airspeed, bank and rudder as the wind asks for."""
+    memory = felt(wind, nav, memory, law.dt)
+    if flare:
+        memory = aligned(wind, wheel_height(law, nav), memory, law.dt)
+    else:
+        memory = kept_left(wind, nav.position[1], memory, law.dt)
+    bank = bank_command(law, nav.position[1], nav.velocity[1], memory.cross_speed, memory.align * memory.side_force)
+    rudder = 0.0
+    if memory.align > 0.0:
+        bank = _within(-wind.align_bank_max, bank, wind.align_bank_max)
+        rudder = align_rudder(wind, nav, memory)
+    airspeed = law.approach_speed + airspeed_added(wind, memory)
+    return command._replace(roll=bank, airspeed=airspeed, align=memory.align, rudder=rudder), memory
 
 
 def _reconsidered(
@@ -283,7 +327,9 @@ def _climb(law: Law, nav: NavState, state: GuidanceState) -> tuple[Command, Guid
     return command, state._replace(phase=_GO_AROUND, pitch=pitch)
 
 
-def bank_command(law: Law, cross: float, cross_speed: float) -> float:
+def bank_command(
+    law: Law, cross: float, cross_speed: float, added_speed: float = 0.0, side_force: float = 0.0
+) -> float:
     """Bank angle (rad) that brings the aircraft to the centreline.
 
     Parameters
@@ -292,15 +338,19 @@ def bank_command(law: Law, cross: float, cross_speed: float) -> float:
         Right of the centreline, m: a positive one commands a bank to the left, which is negative.
     cross_speed : float
         m/s, to the right.
+    added_speed : float
+        Asked for besides what the distance asks for, m/s, to the right.
+    side_force : float
+        Specific force to the right that the bank is to balance, m/s².
     """
-    wanted = _within(-law.lateral_speed_max, -law.lateral_gain * cross, law.lateral_speed_max)
-    bank = math.atan(law.bank_gain * (wanted - cross_speed) / law.gravity)
+    wanted = _within(-law.lateral_speed_max, added_speed - law.lateral_gain * cross, law.lateral_speed_max)
+    bank = math.atan((law.bank_gain * (wanted - cross_speed) - side_force) / law.gravity)
     return _within(-law.bank_max, bank, law.bank_max)
 
 
-def steering_command(law: Law, cross: float, yaw: float, yaw_rate: float) -> float:
+def steering_command(law: Law, cross: float, yaw: float, yaw_rate: float, added_heading: float = 0.0) -> float:
     """Nose wheel and rudder, -1 to 1, right positive, that hold the centreline on the ground."""
-    heading = _within(-law.heading_max, -law.heading_gain * cross, law.heading_max)
+    heading = _within(-law.heading_max, added_heading - law.heading_gain * cross, law.heading_max)
     steering = law.steering_gain * (heading - yaw) - law.yaw_rate_gain * yaw_rate
     return _within(-1.0, steering, 1.0)
 
@@ -309,6 +359,7 @@ def _rollout(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tup
     time = state.rollout_time + law.dt
     start = state.pitch if state.rollout_time > 0.0 else nav.pitch
     pitch = max(law.rollout_pitch, start - law.lower_rate * law.dt)
+    memory = state.wind if law.wind is None else steered(law.wind, nav.position[1], state.wind, law.dt)
     command = Command(
         engaged=True,
         pitch=pitch,
@@ -316,8 +367,8 @@ def _rollout(law: Law, nav: NavState, phase: Phase, state: GuidanceState) -> tup
         airspeed=law.approach_speed,
         idle=True,
         ground=True,
-        steering=steering_command(law, nav.position[1], nav.yaw, nav.rate[2]),
+        steering=steering_command(law, nav.position[1], nav.yaw, nav.rate[2], memory.steering),
         brake=law.brake if time > law.brake_delay else 0.0,
         tilt=law.tilt_rollout,
     )
-    return command, GuidanceState(phase, state.sink_integral, pitch, time, state.tilted, state.doubt)
+    return command, GuidanceState(phase, state.sink_integral, pitch, time, state.tilted, state.doubt, memory)

@@ -409,6 +409,7 @@ class Navigator:
             lateral,
             vertical,
             Alarm.NONE if self._monitor is None else self._monitor.alarm(time),
+            n[21],
         )
 
 
@@ -459,15 +460,16 @@ def _camera_roll(nominal: Array, tilt: float) -> float:
 
 @compiled
 def _known(nominal: Array, bias: Array, sample: Array, earth_rate: Array, dt: float) -> Array:
-    """What `NavState` says of the motion (21,): position, velocity, attitude, Euler angles and body rates.
+    """What `NavState` says of the motion (22,): position, velocity, attitude, Euler angles, body rates and side force.
 
     The rates are those relative to the ground: of the inertial unit's last sample, less bias and the Earth's rotation.
     """
     earth = rotate_back(unpacked(nominal).attitude, (earth_rate[0], earth_rate[1], earth_rate[2]))
     angles = euler(nominal)
-    result = np.empty(21)
+    result = np.empty(22)
     result[:15] = nominal[:15]
     for i in range(3):
         result[15 + i] = angles[i]
         result[18 + i] = sample[i] / dt - bias[i] - earth[i]
+    result[21] = sample[4] / dt - bias[4]
     return result

@@ -87,6 +87,8 @@ _COMMAND = (
     "ap/ground",
     "ap/steering-cmd-norm",
     "ap/brake-cmd-norm",
+    "ap/align",
+    "ap/rudder-align-rad",
 )
 _BALANCES = (  # what trim brings to zero, its tolerance in JSBSim's units, and what it moves to get there
     ("wdot", "accelerations/wdot-ft_sec2", 1e-3, "lift (angle of attack)"),
@@ -344,11 +346,8 @@ class Plant:
         self._set("ic/terrain-elevation-ft", (height + initial.position[2] / R_runway_from_ned[8]) / FT)
         self._set("ic/h-sl-ft", height / FT)
         self._set("ic/psi-true-deg", math.atan2(east, north) / DEG % 360.0)
-        if calm:
-            self._set("ic/vt-fps", initial.speed / FT)
-            self._set("ic/gamma-deg", math.atan2(-down, math.hypot(north, east)) / DEG)
-        else:
-            self._set_wind(rotate_back(R_runway_from_ned, ground), rotate_back(R_runway_from_ned, initial.wind))
+        self._set("ic/vt-fps", initial.speed / FT)
+        self._set("ic/gamma-deg", math.atan2(-down, math.hypot(north, east)) / DEG)
         if self._air != STANDARD_AIR:
             self._set("atmosphere/delta-T", self._air.temperature_offset_c * KELVIN_IN_RANKINE)
             self._set("atmosphere/P-sl-psf", self._air.pressure_hpa * HPA_IN_PSF)
@@ -369,6 +368,8 @@ class Plant:
             self._fdm.do_trim(int(jsbsim.TrimMode.FULL))
         except jsbsim.TrimFailureError as error:
             raise TrimError(self._trim_message(initial, listener.heard)) from error
+        if not calm:
+            self._drift(rotate_back(R_runway_from_ned, ground), rotate_back(R_runway_from_ned, initial.wind))
         if self._air != STANDARD_AIR:
             self.density_ratio = self._get("atmosphere/rho-slugs_ft3") * SLUG / FT**3 / standard_density(height)
         truth = self._last = self._truth()
@@ -381,16 +382,25 @@ class Plant:
         )
         return truth
 
-    def _set_wind(self, ground: Vec3, wind: Vec3) -> None:
-        """Initial velocity over the ground and wind, north, east and down, m/s.
+    def _drift(self, ground: Vec3, wind: Vec3) -> None:
+        """Set the mass of air in which it is trimmed in motion, and the aircraft with it.
 
-        The order counts: with the wind set first, or with an airspeed in place of the velocity, JSBSim makes another
-        state of them.
+        Trimmed in the wind itself JSBSim finds no steady flight where the wind is as fast as the ground goes by.
+        Controls, engine and actuators stay as they are.  The order counts: with the wind set first, or with an airspeed
+        in place of the velocity, JSBSim makes another state of them.
+
+        Parameters
+        ----------
+        ground, wind : Vec3
+            Velocity over the ground and of the air, north, east and down, m/s.
         """
+        for angle, of in (("phi", "phi"), ("theta", "theta"), ("psi", "psi-true")):
+            self._set(f"ic/{of}-rad", self._get(f"attitude/{angle}-rad"))
         for axis, speed in zip("ned", ground, strict=True):
             self._set(f"ic/v{axis}-fps", speed / FT)
         self._set("ic/vw-mag-fps", math.hypot(wind[0], wind[1]) / FT)
         self._set("ic/vw-dir-deg", math.atan2(wind[1], wind[0]) / DEG % 360.0)  # whither it blows
+        self._fdm.run_ic()
 
     def _load_up(self) -> None:
         """Give the point masses the weights that make mass and centre of gravity those of the loading.
@@ -439,7 +449,7 @@ class Plant:
 
     def command(self, command: Command) -> None:
         """Hand guidance's command to the inner loops."""
-        engaged, pitch, roll, airspeed, idle, ground, steering, brake = self._command
+        engaged, pitch, roll, airspeed, idle, ground, steering, brake, align, rudder = self._command
         engaged(command.engaged)
         pitch(command.pitch)
         roll(command.roll)
@@ -448,6 +458,8 @@ class Plant:
         ground(command.ground)
         steering(command.steering)
         brake(command.brake)
+        align(command.align)
+        rudder(command.rudder)
 
     def feed(self, rate: Vec3, side_force: float, roll: float, pitch: float, airspeed: float) -> None:
         """Hand the inner loops their measurements.

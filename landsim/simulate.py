@@ -23,6 +23,7 @@ from landsim.errors import InputError, traceback_of
 from landsim.handover import handed_over
 from landsim.metrics import flight_metrics
 from landsim.navigation import mount_of
+from landsim.omniscient import true_state
 from landsim.onboard import on_board
 from landsim.plant import Plant, StepError, TrimError
 from landsim.plugins import ControllerSetup, EstimatorSetup, PlugInFault, controller_of, estimator_of, versions_of
@@ -207,8 +208,7 @@ def _fly(
         estimator = replace(estimator, handover=handover)
     navigator = estimator_of(scenario.plug_ins.estimator, estimator)
     guidance = controller_of(scenario.plug_ins.controller, controller)
-    command, _ = guidance.guide(navigator.state(0.0))
-    plant.command(command)
+    omniscient, before = settings.guidance_state == "truth", truth.motion
 
     rate, side_force = _ZERO, 0.0
     standing = 0.0
@@ -239,14 +239,18 @@ def _fly(
             recorder.frame(view, result, navigator.known, imu, row)
             diverged = navigator.diverged
         if step % frame_every == 0:
-            command, phase = guidance.guide(navigator.state(truth.time))
+            if omniscient:
+                nav = true_state(truth, before, dt, navigator.airspeed, side_force)
+            else:
+                nav = navigator.state(truth.time)
+            command, phase = guidance.guide(nav)
             recorder.command(command, phase, navigator.stage)
             plant.command(command)
         recorder.step(truth, navigator, airspeed, mount.tilt, tilt_reading)
         if phase is Phase.GO_AROUND:
             if -truth.motion.item(2) >= climbed:
                 return End("go_around", guidance.reason)
-        elif diverged is not None:
+        elif diverged is not None and not omniscient:
             return End("diverged", diverged)
         if truth.wow_nose or truth.wow_left or truth.wow_right:
             if faulty == math.inf:
@@ -260,8 +264,9 @@ def _fly(
         if standing > STANDSTILL_TIME:
             return End("stopped")
         mount.move(command.tilt)
-        roll, pitch = navigator.roll_and_pitch()
+        roll, pitch = truth.roll_and_pitch if omniscient else navigator.roll_and_pitch()
         plant.feed(rate, side_force, roll, pitch, navigator.airspeed)
+        before = truth.motion
         truth = plant.step()
         if truth.structure_contact or not -truth.motion.item(2) > BELOW_GROUND:  # the latter catches NaN
             return _crash(recorder, truth, navigator, airspeed, mount.tilt, tilt_reading)

@@ -104,6 +104,8 @@ class NavState(NamedTuple):
     where navigation states none."""
     vertical_protection: float = math.nan
     alarm: Alarm = Alarm.NONE
+    side_force: float = 0.0
+    """Specific force along body y at the inertial unit, less the estimated bias, m/s²."""
 
 
 class Command(NamedTuple):
@@ -127,3 +129,7 @@ class Command(NamedTuple):
     """0 to 1, both main wheels."""
     tilt: float
     """Camera mount angle asked for, rad, down positive."""
+    align: float = 0.0
+    """In the air: from 0, the rudder coordinates turns, to 1, it is ``rudder`` instead."""
+    rudder: float = 0.0
+    """Rudder asked for, besides the yaw damper's, as far as ``align`` says, rad, nose right positive."""

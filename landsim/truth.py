@@ -6,7 +6,7 @@ log takes down stands in one array, so that it is copied at once.
 
 from typing import NamedTuple
 
-from estimator.so3 import Array, Mat3, Vec3
+from estimator.so3 import Array, Mat3, Vec3, to_euler
 from estimator.strapdown import inertial
 
 
@@ -101,6 +101,12 @@ class Truth(NamedTuple):
     def velocity(self) -> Vec3:
         """Relative to the ground, runway frame, m/s."""
         return inertial(self.motion).velocity
+
+    @property
+    def roll_and_pitch(self) -> tuple[float, float]:
+        """Of the body, relative to the runway frame, rad."""
+        roll, pitch, _ = to_euler(inertial(self.motion).attitude)
+        return roll, pitch
 
     @property
     def R_runway_from_body(self) -> Mat3:

@@ -438,6 +438,8 @@ def test_idle_closes_the_throttle() -> None:
 
 
 READABLE = {
+    "ap/align",
+    "ap/rudder-align-rad",
     "imu/p-rad_sec", "imu/q-rad_sec", "imu/r-rad_sec", "imu/ay-mps2",
     "nav/roll-rad", "nav/pitch-rad", "nav/airspeed-mps",
     "ap/engaged", "ap/pitch-cmd-rad", "ap/roll-cmd-rad", "ap/airspeed-cmd-mps", "ap/idle", "ap/ground",

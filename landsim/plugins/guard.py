@@ -227,6 +227,7 @@ class GuardedEstimator:
             self._level("lateral_protection", given.lateral_protection),
             self._level("vertical_protection", given.vertical_protection),
             self._alarm(given.alarm),
+            guard.number("state", "side_force", given.side_force),
         )
 
     def _level(self, name: str, given: Any) -> float:
@@ -344,4 +345,6 @@ class GuardedController:
             steering=guard.number("guide", "steering", command.steering, -1.0, 1.0),
             brake=guard.number("guide", "brake", command.brake, 0.0, 1.0),
             tilt=guard.number("guide", "tilt", command.tilt),
+            align=guard.number("guide", "align", command.align, 0.0, 1.0),
+            rudder=guard.number("guide", "rudder", command.rudder),
         ), phase

@@ -27,6 +27,7 @@ from landsim.schema.aircraft import (
     MountConfig,
     RolloutGains,
     SpeedsConfig,
+    WindGains,
 )
 from landsim.schema.base import LARGEST, Section, field_names, fields_by_key, rows
 from landsim.schema.dispersions import CorrelationConfig, DispersionsConfig, DrawConfig
@@ -89,6 +90,7 @@ __all__ = [
     "StudyConfig",
     "TurbulenceConfig",
     "WindConfig",
+    "WindGains",
     "applied",
     "drawable",
     "field_names",

@@ -102,12 +102,54 @@ class RolloutGains(Section):
     stop_speed_mps: Positive
 
 
+class WindGains(Section):
+    """``[guidance.wind]``: what is flown with ``approach.law = "wind"``."""
+
+    estimate_time_s: Positive = 4.0
+    """Low-pass of the wind that guidance reckons with."""
+    speed_per_head_wind: NotNegative
+    """Airspeed added per m/s of head wind,"""
+    speed_added_max_mps: NotNegative
+    """and most of it."""
+    pitch_gain_rad_per_mps: NotNegative
+    lateral_gain_per_s: NotNegative
+    bank_gain_per_s: NotNegative
+    """In place of those of ``[guidance.approach]``."""
+    cross_integral_per_s2: NotNegative
+    """Lateral speed asked for, per metre off the centreline and second,"""
+    cross_integral_max_mps: NotNegative
+    """and most of it."""
+    align_height_m: NotNegative
+    """Wheel height at which the nose begins to be turned onto the runway."""
+    align_time_s: Positive
+    """For how long turn coordination is faded out then."""
+    align_gain: NotNegative
+    """Rudder per radian of heading error,"""
+    rudder_per_sideslip: NotNegative
+    """and per radian of the sideslip that it holds."""
+    rudder_max_deg: Positive
+    align_bank_max_deg: Positive
+    """Most bank into the wind meanwhile."""
+    side_force_time_s: Positive = 0.2
+    """Low-pass of the side force that the bank balances."""
+    flare_time_constant_s: Positive
+    flare_height_bias_m: NotNegative
+    """In place of those of ``[guidance.flare]``."""
+    flare_pitch_min_deg: Annotated[float, Field(ge=-10.0, le=20.0)]
+    """Least pitch that is commanded in the flare, so that the main wheels touch first when a gust makes it fast."""
+    rollout_integral_rad_per_m_s: NotNegative
+    """Heading asked for on the ground, per metre off the centreline and second,"""
+    rollout_integral_max_deg: NotNegative
+    """and most of it."""
+
+
 class GuidanceConfig(Section):
     """``[guidance]``: gains by phase."""
 
     approach: ApproachGains
     flare: FlareGains
     rollout: RolloutGains
+    wind: WindGains | None = None
 
 
 class AircraftFile(Section):

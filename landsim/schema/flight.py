@@ -43,6 +43,9 @@ class ApproachConfig(Section):
     glide_slope_deg: Annotated[float, Field(gt=0.0, lt=15.0)] = 3.0
     aim_point_m: NotNegative = 145.0
     """Where the glide slope meets the runway, past the threshold."""
+    law: Literal["calm", "wind"] = "calm"
+    """``wind``: the aircraft's ``[guidance.wind]`` is flown too: airspeed by head wind, crab and de-crab, a
+    flare that holds its sink rate, a rollout against the cross wind."""
 
 
 class GoAroundConfig(Section):
@@ -182,6 +185,9 @@ class SimulationConfig(Section):
     time_limit_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 120.0
     end: Literal["stop", "touchdown"] = "stop"
     """Where a flight ends: at the stop, or at the touchdown, where what comes after is of no interest."""
+    guidance_state: Literal["navigation", "truth"] = "navigation"
+    """What guidance and the attitude loops are given.  ``truth``, for comparison alone, is the true state in place of
+    navigation's: what a flight is then off by is the control's own share.  Navigation runs along and is logged."""
 
 
 class BoxConfig(Section):
