@@ -141,8 +141,48 @@ def _first_order(noise: Array, start: Array, decay: float) -> Array:
     return result
 
 
+class ImuErrors:
+    """What an inertial unit's samples are off by, whatever it feels: bias, bias drift and flicker, and white noise.
+
+    Parameters
+    ----------
+    config : ImuConfig
+    rng : Generator
+
+    Attributes
+    ----------
+    bias : (6,) array
+        That after power-up, with the drift up to the end of the last block: gyros (rad/s) and accelerometers (m/s²).
+    scale : (6,) array
+        Scale factors less one, which act on what the unit feels.
+    """
+
+    def __init__(self, config: ImuConfig, rng: Generator) -> None:
+        noise, factor = imu_noise(config.model_copy(update=dict.fromkeys(_INSTABILITIES, 0.0))), config.error_factor
+        dt = 1.0 / config.rate_hz
+        self._drift = factor * np.repeat((noise.gyro_drift, noise.accel_drift), 3) * math.sqrt(dt)
+        self._white = factor * np.repeat((noise.gyro, noise.accel), 3) * math.sqrt(dt)
+        self.bias = factor * rng.standard_normal(6)
+        self.bias *= (*[noise.gyro_bias] * 3, *[config.accel_bias_mg * MILLI_G] * 3)
+        self.scale = factor * config.scale_factor * rng.standard_normal(6)
+        self._rng = rng
+        self._flicker: Flicker | None = None
+        if config.gyro_bias_instability_deg_h > 0.0 or config.accel_bias_instability_mg > 0.0:
+            gyro, accel = config.gyro_bias_instability_deg_h * DEG_PER_HOUR, config.accel_bias_instability_mg * MILLI_G
+            self._flicker = Flicker(factor * np.repeat((gyro, accel), 3), dt, rng)
+
+    def block(self, samples: int) -> Array:
+        """The next samples (n, 12): biases as rates (rad/s, m/s²), and white noise as increments (rad, m/s)."""
+        drift, white = self._rng.standard_normal((2, samples, 6))
+        bias = self.bias + np.cumsum(drift * self._drift, axis=0)
+        self.bias = bias[-1]
+        if self._flicker is not None:
+            bias = bias + self._flicker.block(samples)
+        return np.concatenate((bias, white * self._white), axis=1)
+
+
 class Imu:
-    """The inertial unit, at the body's origin: bias, bias drift and flicker, white noise and scale factor.
+    """The inertial unit, at the body's origin: the increments it feels, with its scale factors and `ImuErrors`.
 
     Parameters
     ----------
@@ -153,38 +193,18 @@ class Imu:
     """
 
     def __init__(self, config: ImuConfig, site: Site, start: Truth, rng: Generator) -> None:
-        noise, factor = imu_noise(config.model_copy(update=dict.fromkeys(_INSTABILITIES, 0.0))), config.error_factor
-        self._dt = dt = 1.0 / config.rate_hz
-        self._drift = factor * np.repeat((noise.gyro_drift, noise.accel_drift), 3) * math.sqrt(dt)
-        self._white = factor * np.repeat((noise.gyro, noise.accel), 3) * math.sqrt(dt)
-        self._last_bias = factor * rng.standard_normal(6)
-        self._last_bias *= (*[noise.gyro_bias] * 3, *[config.accel_bias_mg * MILLI_G] * 3)
-        scale = factor * config.scale_factor * rng.standard_normal(6)
-        self._rng = rng
-        self._setup = np.array((*site.numbers(), dt, *scale))
+        self._source = ImuErrors(config, rng)
+        self._last = self._source.bias.copy()
+        self._setup = np.array((*site.numbers(), 1.0 / config.rate_hz, *self._source.scale))
         self._rows = rows(6)
         self._count = 0
-        self._last = self._last_bias.copy()
-        self._flicker: Flicker | None = None
-        if config.gyro_bias_instability_deg_h > 0.0 or config.accel_bias_instability_mg > 0.0:
-            gyro, accel = config.gyro_bias_instability_deg_h * DEG_PER_HOUR, config.accel_bias_instability_mg * MILLI_G
-            self._flicker = Flicker(factor * np.repeat((gyro, accel), 3), dt, rng)
-        self._draw()
+        self._errors = self._source.block(BLOCK)
         self._before = start.motion
-
-    def _draw(self) -> None:
-        """The biases of the next block of samples, and their white noise."""
-        drift, white = self._rng.standard_normal((2, BLOCK, 6))
-        bias = self._last_bias + np.cumsum(drift * self._drift, axis=0)
-        self._last_bias = bias[-1]
-        if self._flicker is not None:
-            bias = bias + self._flicker.block(BLOCK)
-        self._errors = np.concatenate((bias, white * self._white), axis=1)
 
     def sample(self, truth: Truth) -> ImuSample:
         """The increments since the last call, which was one interval ago."""
         if self._count == BLOCK:
-            self._draw()
+            self._errors = self._source.block(BLOCK)
             self._count = 0
         before, self._before = self._before, truth.motion
         count, self._count = self._count, self._count + 1
