@@ -87,8 +87,9 @@ def imu_noise(config: ImuConfig) -> ImuNoise:
 _INSTABILITIES = ("gyro_bias_instability_deg_h", "accel_bias_instability_mg")
 FLICKER_TIMES = 0.1 * 4.0 ** np.arange(9)
 """Correlation times of the processes that make up flicker noise, s: from a tenth of a second to two hours."""
-FLICKER_DRIFT_S = 20.0
-"""Half of a flight, about."""
+FLICKER_DRIFT_S = 7.0
+"""What a filter then says of angle, place and velocity is right to a tenth of their σ on a flight of a minute, whatever
+the grade; a longer time makes it trust the unit too much, a shorter one too little."""
 
 
 def flicker_sigma(instability: float) -> float:

@@ -4,6 +4,7 @@
 Allan deviation       the overlapping estimate of units that stand still, against N² / τ + 0.664² B² + K² τ / 3
 random walks          N of angle and velocity, read at τ = 1 s from the slope -1/2
 the unit              reports these errors, sample by sample, whatever the blocks in which they are drawn
+the filter            takes flicker for a random walk: by how much its account is off, by the covariance of both
 ====================  ============================================================================================
 
 The numbers of the sheets stand here once more, in their own units, so that a slip in a conversion shows.
@@ -16,11 +17,12 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from numpy.random import default_rng
+from scipy.linalg import block_diag
 
 from estimator.so3 import Array
 from landsim.config import ImuConfig
 from landsim.runway import Runway
-from landsim.sensors import BLOCK, Imu, ImuErrors, site_of
+from landsim.sensors import BLOCK, Imu, ImuErrors, flicker_sigma, imu_noise, site_of
 from landsim.truth import NUMBERS, Truth
 
 HOUR = 3600.0
@@ -130,3 +132,95 @@ def test_the_unit_reports_these_errors() -> None:
     off = np.array([unit.sample(still) - ideal.sample(still) for _ in range(3 * BLOCK)])
     np.testing.assert_allclose(off, errors[:, :6] / 120.0 + errors[:, 6:], atol=1e-12)
     np.testing.assert_allclose(unit.errors(), errors[-1, :6], atol=1e-12)
+
+
+TIMES = 0.05 * 2.0 ** np.arange(19)
+"""Correlation times of a flicker made for the test, s: denser than the unit's own, and over more decades."""
+
+
+def normalised_squares(
+    sheet: Sheet, believed: tuple[float, float, float], bias: float, order: int, sigma: float
+) -> Array:
+    """Expected squares over the variances that a filter believes, after 50 s: of what it measures, and of the bias.
+
+    One axis, of which an angle (order 1) or a place (order 2) is measured 30 times a second and the unit's error is the
+    rate or the acceleration.  The filter has a bias that walks, the truth a walk and flicker; the covariance of both
+    together is carried on (Maybeck, Stochastic Models, Estimation, and Control, vol. 1, section 6.8).
+
+    Parameters
+    ----------
+    sheet : Sheet
+        What is true.
+    believed : (3,) float
+        The filter's white noise, walk of the bias and its standard deviation at the start.
+    bias : float
+        1 σ of the true one, without flicker.
+    order : {1, 2}
+    sigma : float
+        Of a measurement.
+    """
+    dt, flicker = 1.0 / 30.0, (sheet.floor / 0.664) ** 2 * math.log(2.0) / math.pi
+    decay = np.exp(-dt / TIMES)
+    white = np.array(((dt,),)) if order == 1 else np.array(((dt**3 / 3.0, dt**2 / 2.0), (dt**2 / 2.0, dt)))
+
+    def moved(biases: int) -> Array:
+        F = np.eye(order + biases)
+        F[order - 1, order:] = dt
+        if order == 2:
+            F[0, 1], F[0, 2:] = dt, dt**2 / 2.0
+        return F
+
+    first = (0.01**2,) if order == 1 else (3.0**2, 0.2**2)
+    F, Q = moved(1), block_diag(believed[0] ** 2 * white, believed[1] ** 2 * dt)
+    P = np.diag((*first, believed[2] ** 2))
+    true_F = moved(1 + TIMES.size)
+    true_F[order + 1 :, order + 1 :] = np.diag(decay)
+    true_F[order - 1, order + 1 :] = TIMES * (1.0 - decay)  # its mean over the interval
+    true_Q = block_diag(sheet.noise**2 * white, sheet.walk**2 * dt, np.diag(flicker * (1.0 - decay**2)))
+    n, both = order + 1, order + 1 + true_F.shape[0]
+    joint = np.zeros((both, both))
+    joint[n:, n:] = np.diag((*first, bias**2, *[flicker] * TIMES.size))
+    total = np.zeros((n, both - n))  # what of the truth the filter estimates
+    total[:order, :order] = np.eye(order)
+    total[order, order:] = 1.0
+    h = np.eye(n)[:1]
+    for _ in range(1500):
+        A = block_diag(F, true_F)
+        joint = A @ joint @ A.T
+        joint[n:, n:] += true_Q
+        P = F @ P @ F.T + Q
+        gain = P @ h.T / (h @ P @ h.T + sigma**2)
+        C = np.eye(both)
+        C[:n, :n], C[:n, n:] = np.eye(n) - gain @ h, gain @ h @ total
+        joint = C @ joint @ C.T
+        joint[:n, :n] += sigma**2 * gain @ gain.T
+        P = (np.eye(n) - gain @ h) @ P
+    E = np.hstack((-np.eye(n), total))
+    error = E @ joint @ E.T
+    leading = np.trace(np.linalg.solve(P[:order, :order], error[:order, :order])) / order
+    return np.array((leading, error[order, order] / P[order, order]))
+
+
+# of a frame's attitude, rad, and of its place, m: far from the threshold and near it
+MEASURED = {"gyro": (1, (2e-3, 3e-4)), "accelerometer": (2, (1.0, 0.1))}
+
+
+@pytest.mark.parametrize(("grade", "kind"), SHEETS)
+def test_flicker_as_the_filter_takes_it(grade: str, kind: str) -> None:
+    """Angle, place and velocity are as uncertain as it says to a tenth of their σ, the bias at most 1.6 times as much.
+
+    The fast part of the flicker counts as bias too, and nothing could follow it.
+    """
+    config = ImuConfig.model_validate({"grade": grade, "scale_factor": 0.0})
+    noise, sheet = imu_noise(config), SHEETS[grade, kind]
+    spread = flicker_sigma(sheet.floor / 0.664)
+    believed = (
+        (noise.gyro, noise.gyro_drift, noise.gyro_bias)
+        if kind == "gyro"
+        else (noise.accel, noise.accel_drift, noise.accel_bias)
+    )
+    order, sigmas = MEASURED[kind]
+    for sigma in sigmas:
+        squares = normalised_squares(sheet, believed, math.sqrt(believed[2] ** 2 - spread**2), order, sigma)
+        assert 0.9**2 < squares[0] < 1.1**2
+        assert 0.9**2 < squares[1] < 1.6**2
