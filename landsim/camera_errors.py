@@ -235,12 +235,18 @@ def _imaged(
     axes = calibrated_axes(camera_axes(body.attitude, tilt), setup[11], setup[12])
     distortion, exposure, visibility, believed, spacing = setup[13], setup[14], setup[15], setup[16], setup[18]
     (a, b, c), (d, e, f), (g, h, i) = axes
-    vx, vy, vz = body.velocity
-    speed = (a * vx + b * vy + c * vz, d * vx + e * vy + f * vz, g * vx + h * vy + i * vz)
     m = body.attitude  # of the body's rates, by way of the runway's frame
     wx = m[0] * rate[0] + m[1] * rate[1] + m[2] * rate[2]
     wy = m[3] * rate[0] + m[4] * rate[1] + m[5] * rate[2]
     wz = m[6] * rate[0] + m[7] * rate[1] + m[8] * rate[2]
+    # of the projection centre, which the lever arm swings
+    x, y, z = px - body.position[0], py - body.position[1], pz - body.position[2]
+    vx, vy, vz = (
+        body.velocity[0] + wy * z - wz * y,
+        body.velocity[1] + wz * x - wx * z,
+        body.velocity[2] + wx * y - wy * x,
+    )
+    speed = (a * vx + b * vy + c * vz, d * vx + e * vy + f * vz, g * vx + h * vy + i * vz)
     turn = (a * wx + b * wy + c * wz, d * wx + e * wy + f * wz, g * wx + h * wy + i * wz)
     for line in range(3):
         if line == missing:
