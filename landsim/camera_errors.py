@@ -2,8 +2,8 @@
 
 `landsim.sensors.LineCamera` is the camera without these.  Here each point of a line is made by itself: points evenly
 spread between the ends of what is seen, moved by the lens' distortion and by noise; then a line is fitted to them.
-What the detector can see of the noise itself, blur and lost contrast, it reports, as fewer points: with a noise that is
-f times as great, the number of points and their spread are divided by f².
+What the detector can see of the noise itself, blur and lost contrast, it reports, as fewer points and less spread: with
+a noise that is f times as great, their number is divided by f², and so is the spread, as far as that is not noise too.
 """
 
 import math
@@ -297,7 +297,7 @@ def _imaged(
         la, lb, lc, spread = _line_from_moments(
             u + mu, v + mv, suu - number * mu * mu, suv - number * mu * mv, svv - number * mv * mv
         )
-        readings[line] = np.array((la, lb, lc, u + mu, v + mv, spread / worse, number / worse))
+        readings[line] = np.array((la, lb, lc, u + mu, v + mv, _told(spread, number, believed, worse), number / worse))
         off0, off1 = la * ends[line, 0] + lb * ends[line, 1] + lc, la * ends[line, 2] + lb * ends[line, 3] + lc
         seen[line] = np.array(
             (
@@ -308,6 +308,31 @@ def _imaged(
             )
         )
     return readings, ends, seen
+
+
+@compiled
+def _told(spread: float, number: int, believed: float, worse: float) -> float:
+    """The spread by which number / worse points of the noise that is believed fix the line's angle as well as these do.
+
+    What noise there is along the line is no lever arm and is taken off the spread, S; a fit whose points are noisy by
+    σ both along and across the line has an angle of the variance (1 + N σ²/S) σ²/S to second order.  Where the noise
+    is what is believed, the spread is told as measured: `estimator.lines.unguarded_variances` does the rest.
+
+    Parameters
+    ----------
+    spread : float
+        As measured, px².
+    number : int
+        Of points.
+    believed : float
+        1 σ of a point as navigation believes it, px.
+    worse : float
+        Variance of a point, as the detector sees it, over what is believed.
+    """
+    noise = believed * believed
+    lever = max(spread - (number - 1) * worse * noise, 0.1 * spread)
+    more = 1.0 + number * (worse - 1.0) * noise / lever if lever > 0.0 else 1.0
+    return lever / (worse * more) + max(number / worse - 1.0, 0.0) * noise
 
 
 @compiled
