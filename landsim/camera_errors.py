@@ -4,6 +4,7 @@
 spread between the ends of what is seen, moved by the lens' distortion and by noise; then a line is fitted to them.
 What the detector can see of the noise itself, blur and lost contrast, it reports, as fewer points and less spread: with
 a noise that is f times as great, their number is divided by f², and so is the spread, as far as that is not noise too.
+A line is reported when it is f times as long as one has to be without.
 """
 
 import math
@@ -275,6 +276,8 @@ def _imaged(
         blur = smear * smear / 12.0
         sigma = math.sqrt((setup[17] * believed / contrast) ** 2 + blur)
         worse = 1.0 / (contrast * contrast) + (blur / (believed * believed) if believed > 0.0 else 0.0)
+        if length < setup[7] * math.sqrt(worse):  # no line stands out of so much noise
+            continue
         number = max(2, int(length / spacing) + 1)
         su = sv = suu = suv = svv = 0.0
         for k in range(number):

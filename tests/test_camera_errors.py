@@ -297,7 +297,7 @@ def test_frames_are_lost_by_the_stated_share_and_the_others_stay() -> None:
 
 def test_what_is_seen_ends_at_the_visibility() -> None:
     """From 300 m before the threshold and 18 m up, by Pythagoras."""
-    truth, device = level(300.0, 18.0), camera(visibility_m=500.0)
+    truth, device = level(300.0, 18.0), camera(visibility_m=500.0, min_line_px=2.0)
     view = device.view(truth, TILT, 0.0, (0.0, 0.0, 0.0))
     far = math.sqrt(500.0**2 - 15.0**2 - 18.0**2) - 300.0
     for row, ends in enumerate(
@@ -306,7 +306,7 @@ def test_what_is_seen_ends_at_the_visibility() -> None:
         np.testing.assert_allclose(view.true_ends[row], pixels(truth, ends).ravel(), atol=1e-6)
     # the middle of the threshold is nearer than its corners
     half = math.sqrt(300.7**2 - 300.0**2 - 18.0**2)
-    view = camera(visibility_m=300.7).view(truth, TILT, 0.0, (0.0, 0.0, 0.0))
+    view = camera(visibility_m=300.7, min_line_px=2.0).view(truth, TILT, 0.0, (0.0, 0.0, 0.0))
     np.testing.assert_allclose(
         view.true_ends[1], pixels(truth, ((0.0, -half, 0.0), (0.0, half, 0.0))).ravel(), atol=1e-6
     )
@@ -349,7 +349,7 @@ def test_noise_grows_as_contrast_falls_and_the_reading_says_so(before: float, ro
     Total least squares through points that are as noisy along the line adds to the angle what is of second order.
     """
     truth, visibility = level(before, 18.0), 600.0
-    device = camera(noise_px=1.5, visibility_m=visibility)
+    device = camera(noise_px=1.5, visibility_m=visibility, min_line_px=2.0)
     if row == 1:
         middle = np.array((before, 0.0, 18.0))
     else:
@@ -369,6 +369,14 @@ def test_noise_grows_as_contrast_falls_and_the_reading_says_so(before: float, ro
     measured, believed = scatter(device, truth, row)
     np.testing.assert_allclose(measured, stated, rtol=0.05)
     np.testing.assert_allclose(believed, measured, rtol=0.05)
+
+
+@pytest.mark.parametrize(("before", "seen"), [(540.0, True), (590.0, False)])
+def test_a_line_stands_out_of_its_noise(before: float, seen: bool) -> None:
+    """The threshold is 30 m f / d long and has to be 8 px exp(3 d / 800 m): both are 67 px at 567 m."""
+    view = camera(noise_px=1.5, visibility_m=800.0).view(level(before, 18.0), TILT, 0.0, (0.0, 0.0, 0.0))
+    assert (view.frame.reading(1) is not None) is seen
+    assert np.isfinite(view.true_ends[1]).all() == seen
 
 
 def test_the_detector_is_not_told_of_noise_beyond_its_own() -> None:

@@ -31,7 +31,7 @@ class CameraConfig(Section):
     point_spacing_px: Annotated[float, Field(ge=0.1, le=LARGEST)] = 1.0
     """Between the points along a line, with ``edge-points``."""
     min_line_px: Annotated[float, Field(ge=2.0)] = 8.0
-    """A shorter line is not reported."""
+    """A shorter line is not reported; in fog and with blur it has to be longer by as much as its points are noisier."""
     near_m: Positive = 1.0
     """Depth of the near plane."""
     pan_error_deg: Annotated[float, Field(ge=-45.0, le=45.0)] = 0.0
