@@ -11,7 +11,9 @@ The numbers of the sheets stand here once more, in their own units, so that a sl
 """
 
 import math
+import re
 from functools import lru_cache
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +21,7 @@ import pytest
 from numpy.random import default_rng
 from scipy.linalg import block_diag
 
+import landsim
 from estimator.so3 import Array
 from landsim.config import ImuConfig
 from landsim.runway import Runway
@@ -117,6 +120,17 @@ def test_allan_deviation_is_that_of_the_sheet(grade: str, kind: str) -> None:
     for part in Sheet._fields:
         without = sheet._replace(**{part: 0.0})
         assert max(value / without.deviation(tau) for tau, value in table.items()) > 1.1, part
+
+
+@pytest.mark.parametrize(("grade", "kind"), SHEETS)
+def test_allan_deviations_on_the_page_are_those_measured(grade: str, kind: str) -> None:
+    page = (Path(landsim.__file__).parents[1] / "docs/sensors.md").read_text(encoding="utf-8")
+    (row,) = re.findall(rf"^\| {grade} \| {kind}, (\S+) \| (.*) \|$", page, re.MULTILINE)
+    unit = {"°/h": DEG_H, "mg": MILLI_G}[row[0]]
+    for cell, tau in zip(row[1].split(" | "), (0.1, 1.0, 10.0, 100.0, 1000.0), strict=True):
+        found, stated = (float(number) for number in cell.rstrip(")").split(" ("))
+        assert found == pytest.approx(measured(grade)[tau][list(KINDS).index(kind)] / unit, rel=0.01)
+        assert stated == pytest.approx(SHEETS[grade, kind].deviation(tau) / unit, rel=0.005)
 
 
 def test_the_unit_reports_these_errors() -> None:
