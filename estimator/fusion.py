@@ -8,6 +8,7 @@ and set to zero.
 
 import math
 import types
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -152,7 +153,11 @@ class InertialVisionFilter:
         self._noise_dt = 0.0
         self._elapsed = 0.0
 
-    _predicted = staticmethod(predicted)
+    _predicted: Callable[..., tuple[Array, Array]] = staticmethod(predicted)
+
+    def unscaled(self, sample: Array) -> Array:
+        """A sample (6,) of the inertial unit without what scale factors make of it: this filter knows of none."""
+        return sample
 
     @property
     def state(self) -> Inertial:

@@ -1,7 +1,8 @@
-"""The filter that takes each line by itself, and the camera's calibration as part of its state.
+"""The filter that takes each line by itself, with the camera's calibration and scale factors as part of its state.
 
-Besides the 15 errors of `estimator.fusion` it carries the eight constants of `estimator.single_lines.Calibration`, each
-with the standard deviation that it is known with.  One that is known exactly has none and stays what it is.
+Besides the 15 errors of `estimator.fusion` it carries the eight constants of `estimator.single_lines.Calibration`, and
+where the inertial unit has scale factors those of its six axes, each with the standard deviation that it is known with.
+One that is known exactly has none and stays what it is.
 """
 
 from typing import NamedTuple
@@ -14,9 +15,40 @@ from estimator.compiled import compiled
 from estimator.fusion import NO_UPDATE, Gates, InertialVisionFilter, Update, taken_in
 from estimator.innovation import Eye, Innovation
 from estimator.mount import Mount
-from estimator.single_lines import CONSTANTS, lines_innovation
+from estimator.single_lines import AUGMENTED, CONSTANTS, lines_innovation
 from estimator.so3 import Array
-from estimator.strapdown import STATES, ImuNoise, Site, predicted_with_constants
+from estimator.strapdown import ACCEL_BIAS, AXES, STATES, ImuNoise, Site, predicted_with_constants
+
+SCALED = AUGMENTED + AXES
+"""Numbers of a filter that estimates scale factors."""
+_BIASES = slice(STATES - AXES, STATES)
+
+
+def with_constants(start: Start, calibration: Array, noise: ImuNoise, gravity: float) -> Start:
+    """A start with the constants behind its errors.
+
+    Parameters
+    ----------
+    start : Start
+        Its covariance is (15, 15), or (23, 23) if it has the calibration already.
+    calibration : (8,) array
+        Standard deviations.
+    noise : ImuNoise
+        With a scale factor, six more constants follow, and what it makes of gravity is not in the biases any more.
+    gravity : float
+        m/s².
+    """
+    given = len(start.covariance)
+    size = SCALED if noise.scale_factor > 0.0 else AUGMENTED
+    covariance = np.zeros((size, size))
+    covariance[:given, :given] = start.covariance
+    if given == STATES:
+        covariance[STATES:AUGMENTED, STATES:AUGMENTED] = np.diag(calibration**2)
+    if size == SCALED:
+        square = noise.scale_factor**2
+        covariance[AUGMENTED:, AUGMENTED:] = np.eye(AXES) * square
+        covariance[ACCEL_BIAS, ACCEL_BIAS] -= np.eye(3) * square * gravity**2
+    return Start(start.state, covariance)
 
 
 class LinesUpdate(NamedTuple):
@@ -38,12 +70,15 @@ class LineVisionFilter(InertialVisionFilter):
     gates : (3,) array
         Largest normalised square that is believed of one, two and three lines: `estimator.single_lines.gates_of`.
     start : Start
-        Its covariance is (23, 23), the calibration's constants last.
+        Its covariance is (23, 23), the calibration's constants last, or (29, 29) with the scale factors behind them:
+        `with_constants`.
 
     Attributes
     ----------
     calibration : (8,) array
         As estimated; never written to.
+    scale_factor : (6,) array
+        Of gyros and accelerometers, likewise.
     """
 
     def __init__(
@@ -60,8 +95,49 @@ class LineVisionFilter(InertialVisionFilter):
         self._eye = Eye(camera, width, mount).numbers()
         self._line_gates = gates
         self.calibration = np.zeros(CONSTANTS)
+        self.scale_factor = np.zeros(AXES)
+        self._scaled = len(start.covariance) == SCALED
+        self._turned = np.zeros(AXES)
 
-    _predicted = staticmethod(predicted_with_constants)
+    def unscaled(self, sample: Array) -> Array:
+        """A sample (6,) of the inertial unit without what the scale factors make of it."""
+        return sample - self.scale_factor * sample if self._scaled else sample
+
+    def propagate(self, sample: Array, dt: float) -> tuple[float, float]:
+        """As `InertialVisionFilter.propagate`."""
+        if self._scaled:
+            self._turned += sample
+        return super().propagate(self.unscaled(sample), dt)
+
+    def _predicted(self, nominal: Array, covariance: Array, noise: Array, dt: float) -> tuple[Array, Array]:
+        moved = predicted_with_constants(nominal, covariance, noise, dt, self._turned, AUGMENTED)
+        self._turned = np.zeros(AXES)
+        return moved
+
+    def biases(self, rate: Array, covariance: Array) -> tuple[Array, Array]:
+        """What the inertial unit is off by as it turns now, bias and scale factor together.
+
+        Parameters
+        ----------
+        rate : (6,) array
+            As measured, rad/s and m/s².
+        covariance : (n, n) array
+            Of all errors now.
+
+        Returns
+        -------
+        (6,), (15, 15) array
+            rad/s and m/s², and the covariance of the 15 errors with these in place of the biases.
+        """
+        errors: Array = covariance[:STATES, :STATES].copy()
+        if not self._scaled:
+            return self.bias, errors
+        scale = covariance[AUGMENTED:, AUGMENTED:] * np.outer(rate, rate)
+        mixed = covariance[:STATES, AUGMENTED:] * rate
+        errors[:, _BIASES] += mixed
+        errors[_BIASES] += mixed.T
+        errors[_BIASES, _BIASES] += scale
+        return self.bias + self.scale_factor * rate, errors
 
     @property
     def covariance(self) -> Array:
@@ -71,7 +147,7 @@ class LineVisionFilter(InertialVisionFilter):
 
     @property
     def augmented_covariance(self) -> Array:
-        """Covariance (23, 23) of all errors; not to be written to."""
+        """Covariance (23, 23) or (29, 29) of all errors; not to be written to."""
         result: Array = self._ekf.P
         return result
 
@@ -97,13 +173,15 @@ class LineVisionFilter(InertialVisionFilter):
         # what rounding leaves of P - Pᵀ grows from frame to frame where constants are hardly observed
         ekf.P = 0.5 * (ekf.P + ekf.P.T)
         _, self.nominal, self.bias = taken_in(y, ekf.SI, ekf.x, self.nominal, self.bias)
-        self.calibration = self.calibration + ekf.x[STATES:]
+        self.calibration = self.calibration + ekf.x[STATES:AUGMENTED]
+        if self._scaled:
+            self.scale_factor = self.scale_factor + ekf.x[AUGMENTED:]
         ekf.x = self._zero
         return LinesUpdate(Update(len(y), nis, True), found, believed)
 
 
 @compiled
-def carried(nominal: Array, covariance: Array, noise: Array, dt: float) -> Array:
+def carried(nominal: Array, covariance: Array, noise: Array, dt: float, turned: Array) -> Array:
     """The covariance (n, n) over a time, as `predicted_with_constants`."""
-    _, result = predicted_with_constants(nominal, covariance, noise, dt)
+    _, result = predicted_with_constants(nominal, covariance, noise, dt, turned, AUGMENTED)
     return result

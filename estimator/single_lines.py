@@ -271,26 +271,27 @@ def lines_innovation(
     ----------
     eye, lines, extent, nominal, calibration, tilt
         As for `line_residuals`.
-    covariance : (23, 23) array
-        Of the predicted errors.
+    covariance : (23, 23) or larger array
+        Of the predicted errors; on what follows the calibration no line depends.
     gates : (3,) array
         As for `believed_lines`.
 
     Returns
     -------
-    y, H, R : (n,), (n, 23) and (n, n) array
+    y, H, R : (n,), (n, 23 or more) and (n, n) array
         n is two for each line that is believed.
     found, believed : int
     nis : float
         As `believed_lines` gives them.
     """
     d, H = line_residuals(eye, lines, extent, nominal, calibration, tilt)
-    HP = np.zeros((6, AUGMENTED))
+    size = covariance.shape[0]
+    HP = np.zeros((6, size))
     R, S = np.zeros((6, 6)), np.zeros((6, 6))
     for i in range(6):
         for k in range(AUGMENTED):
             if H[i, k] != 0.0:
-                for j in range(AUGMENTED):
+                for j in range(size):
                     HP[i, j] += H[i, k] * covariance[k, j]
         # the reading of the mount's angle is off for all lines alike
         for j in range(6):
@@ -304,10 +305,10 @@ def lines_innovation(
     found, believed, nis = believed_lines(d, S, gates)
     rows = _rows(believed)
     n = len(rows)
-    y, rows_of_H, block = np.empty(n), np.empty((n, AUGMENTED)), np.empty((n, n))
+    y, rows_of_H, block = np.empty(n), np.zeros((n, size)), np.empty((n, n))
     for i in range(n):
         y[i] = d[rows[i]]
-        rows_of_H[i] = H[rows[i]]
+        rows_of_H[i, :AUGMENTED] = H[rows[i]]
         for j in range(n):
             block[i, j] = R[rows[i], rows[j]]
     return y, rows_of_H, block, found, believed, nis

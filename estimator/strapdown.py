@@ -20,6 +20,8 @@ from estimator.so3 import Array, Mat3, Vec3
 
 POSITION, VELOCITY, ATTITUDE, GYRO_BIAS, ACCEL_BIAS = (slice(3 * i, 3 * i + 3) for i in range(5))
 STATES = 15
+AXES = 6
+"""Three gyros and three accelerometers."""
 NOMINAL = 18
 """Numbers of a nominal state as an array: position, velocity, attitude (9, row by row), and the specific force
 (runway frame, m/s) integrated since it was last set to zero."""
@@ -72,7 +74,9 @@ class ImuNoise(NamedTuple):
     gyro_bias: float
     """rad/s."""
     accel_bias: float
-    """m/s²."""
+    """m/s²; what a scale factor makes of gravity is in it."""
+    scale_factor: float = 0.0
+    """Relative, of gyros and accelerometers alike, for a filter that estimates it."""
 
 
 def gravity_at(site: Site, position: Vec3) -> Vec3:
@@ -317,32 +321,50 @@ def predicted(nominal: Array, covariance: Array, noise: Array, dt: float) -> tup
 
 
 @compiled
-def predicted_with_constants(nominal: Array, covariance: Array, noise: Array, dt: float) -> tuple[Array, Array]:
+def predicted_with_constants(
+    nominal: Array, covariance: Array, noise: Array, dt: float, turned: Array, first_scale: int
+) -> tuple[Array, Array]:
     """As `predicted`, of a covariance (n, n) in which constants follow the 15 errors.
 
-    With P = [A B; Bᵀ C] it is [F A Fᵀ + Q, F B; (F B)ᵀ, C].
+    Six of them may be the scale factors of the inertial unit: what it measured over the time is off by so much of it,
+    as a bias is off by so much a second.
+
+    Parameters
+    ----------
+    nominal, covariance, noise, dt
+        As for `predicted`, the covariance (n, n).
+    turned : (6,) array
+        What the inertial unit measured over the time, angle (rad) and velocity (m/s), body frame.
+    first_scale : int
+        Row of the first scale factor; n where there are none.
     """
-    moved, moving = predicted(nominal, covariance[:STATES, :STATES].copy(), noise, dt)
-    F = transition(nominal, dt)
-    result = covariance.copy()
-    result[:STATES, :STATES] = moving
-    for i in range(STATES):
-        for j in range(STATES, covariance.shape[0]):
-            total = 0.0
-            for k in range(STATES):
-                total += F[i, k] * covariance[k, j]
-            result[i, j] = result[j, i] = total
+    n = covariance.shape[0]
+    F, half, result = np.eye(n), np.zeros((n, n)), np.zeros((n, n))
+    F[:STATES, :STATES] = transition(nominal, dt)
+    if first_scale < n:
+        for i in range(3):
+            for j in range(3):
+                body = -nominal[6 + 3 * i + j]
+                F[6 + i, first_scale + j] = body * turned[j]
+                F[3 + i, first_scale + 3 + j] = body * turned[3 + j]
+                F[i, first_scale + 3 + j] = 0.5 * dt * body * turned[3 + j]
+    result[:STATES, :STATES] = noise
+    _add_product(half, F, covariance)
+    _add_product(result, F, half.T.copy())
+    moved = nominal.copy()
+    moved[15:] = 0.0
     return moved, result
 
 
 @compiled
 def _add_product(result: Array, sparse: Array, matrix: Array) -> None:
-    """Add the product of two matrices (15, 15), of which the first is mostly zero, to a third."""
-    for i in range(STATES):
-        for k in range(STATES):
+    """Add the product of two square matrices, of which the first is mostly zero, to a third."""
+    n = len(sparse)
+    for i in range(n):
+        for k in range(n):
             factor = sparse[i, k]
             if factor != 0.0:
-                for j in range(STATES):
+                for j in range(n):
                     result[i, j] += factor * matrix[k, j]
 
 

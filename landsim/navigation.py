@@ -20,12 +20,11 @@ from estimator.compiled import compiled, rotate_back
 from estimator.covariance import LEFT, RIGHT, THRESHOLD
 from estimator.fusion import NO_UPDATE, Gates, InertialVisionFilter, Update
 from estimator.innovation import Eye, Innovation, frame_innovation
-from estimator.line_fusion import LineVisionFilter, carried
+from estimator.line_fusion import LineVisionFilter, carried, with_constants
 from estimator.lines import unguarded_variances
 from estimator.mount import Mount, body_from_camera, camera_axes
 from estimator.single_lines import (
     BOTH_EDGES,
-    CONSTANTS,
     NO_CALIBRATION,
     Calibration,
     gates_of,
@@ -47,7 +46,7 @@ from estimator.three_line import three_line_pose
 from landsim.config import MountConfig, NavigationConfig
 from landsim.integrity import LineMonitor, protection_factor
 from landsim.state import Alarm, CameraFrame, ImuSample, NavState, Stage
-from landsim.units import DEG
+from landsim.units import DEG, STANDARD_GRAVITY
 
 NAN = math.nan
 
@@ -185,6 +184,8 @@ class Navigator:
         self._lag = round(latency / imu_dt)
         self._waiting: deque[ImuSample] = deque()
         self._present: Array | None = None
+        self._noise_dt, self._noise = NAN, np.empty(0)
+        self._known: Known | None = None
         self._monitor: LineMonitor | None = None
         self._protection = protection_factor(config.integrity_risk)
         if config.aiding == "lines":
@@ -200,12 +201,8 @@ class Navigator:
         if self._monitor is None:
             self.filter = InertialVisionFilter(*given, self._gates, start)
             return
-        covariance = start.covariance
-        if len(covariance) == STATES:
-            covariance = np.zeros((STATES + CONSTANTS, STATES + CONSTANTS))
-            covariance[:STATES, :STATES] = start.covariance
-            covariance[STATES:, STATES:] = np.diag(self._calibration**2)
-        self.filter = LineVisionFilter(*given, self._line_gates, Start(start.state, covariance))
+        start = with_constants(start, self._calibration, self._imu, STANDARD_GRAVITY)
+        self.filter = LineVisionFilter(*given, self._line_gates, start)
 
     def _new_alignment(self) -> Alignment:
         config = self._config
@@ -220,6 +217,7 @@ class Navigator:
     def propagate(self, sample: ImuSample) -> None:
         """Take in a sample of the inertial unit."""
         self._sample = sample
+        self._known = None
         if self._lag:
             self._propagate_late(sample)
         elif self.filter is None:
@@ -239,6 +237,7 @@ class Navigator:
             self.filter.propagate(due, self._dt)
         before = self.filter.nominal if self._present is None else self._present
         self._present = np.empty_like(before)
+        sample = self.filter.unscaled(sample)
         self._angles = advance_into(self._present, before, self.filter.bias, sample, self._site.numbers(), self._dt)
 
     def _to_the_present(self) -> None:
@@ -249,11 +248,12 @@ class Navigator:
         site = self._site.numbers()
         for sample in self._waiting:
             before, moved = moved, np.empty_like(moved)
-            advance_into(moved, before, self.filter.bias, sample, site, self._dt)
+            advance_into(moved, before, self.filter.bias, self.filter.unscaled(sample), site, self._dt)
         self._present = moved
 
     def observe(self, frame: CameraFrame) -> FrameResult:
         """Take in a camera frame."""
+        self._known = None
         result = self._observe(frame)
         if self._lag and self.filter is not None:
             self._to_the_present()
@@ -324,19 +324,30 @@ class Navigator:
         running = self.filter
         if running is None or not (self._lag or isinstance(running, LineVisionFilter)):
             return running
-        calibration, augmented = NO_CALIBRATION, None
-        covariance = running.covariance
-        if isinstance(running, LineVisionFilter):
-            calibration, augmented = running.calibration, running.augmented_covariance
-        if self._lag and self._waiting and self._present is not None:
-            dt = len(self._waiting) * self._dt
-            noise = process_noise(self._imu, dt)
-            if augmented is not None:
-                augmented = carried(self._present, augmented, noise, dt)
-                covariance = augmented[:STATES, :STATES].copy()
-            else:
-                covariance = predicted(self._present, covariance, noise, dt)[1]
-        return Known(covariance, running.bias, calibration, augmented)
+        if self._known is None:
+            self._known = self._known_of(running)
+        return self._known
+
+    def _known_of(self, running: InertialVisionFilter) -> Known:
+        dt = len(self._waiting) * self._dt
+        present = self._present if self._waiting else None
+        if not isinstance(running, LineVisionFilter):
+            covariance = running.covariance
+            if present is not None:
+                covariance = predicted(present, covariance, self._noise_over(dt), dt)[1]
+            return Known(covariance, running.bias)
+        augmented = running.augmented_covariance
+        if present is not None:
+            turned = np.sum(self._waiting, axis=0)
+            augmented = carried(present, augmented, self._noise_over(dt), dt, turned)
+        bias, covariance = running.biases(self._sample / self._dt, augmented)
+        return Known(covariance, bias, running.calibration, augmented)
+
+    def _noise_over(self, dt: float) -> Array:
+        """The process noise (15, 15) of a time, which is mostly the latency."""
+        if dt != self._noise_dt:
+            self._noise_dt, self._noise = dt, process_noise(self._imu, dt)
+        return self._noise
 
     @property
     def diverged(self) -> str | None:
@@ -389,7 +400,9 @@ class Navigator:
         """What guidance is given."""
         running = self.filter
         bias = _NO_BIAS if running is None else running.bias
-        n = _known(self.nominal, bias, self._sample, self._earth_rate, self._dt).tolist()
+        if isinstance(running, LineVisionFilter):
+            bias = bias + running.scale_factor * self._sample / self._dt
+        n = _motion(self.nominal, bias, self._sample, self._earth_rate, self._dt).tolist()
         lateral, vertical = NAN, NAN
         if (covariance := self.covariance) is not None:
             lateral = self._protection * math.sqrt(covariance.item(1, 1))
@@ -459,7 +472,7 @@ def _camera_roll(nominal: Array, tilt: float) -> float:
 
 
 @compiled
-def _known(nominal: Array, bias: Array, sample: Array, earth_rate: Array, dt: float) -> Array:
+def _motion(nominal: Array, bias: Array, sample: Array, earth_rate: Array, dt: float) -> Array:
     """What `NavState` says of the motion (22,): position, velocity, attitude, Euler angles, body rates and side force.
 
     The rates are those relative to the ground: of the inertial unit's last sample, less bias and the Earth's rotation.

@@ -81,6 +81,7 @@ def imu_noise(config: ImuConfig) -> ImuNoise:
         accel_drift=config.accel_bias_drift_mg_sqrt_h * MILLI_G * drift,
         gyro_bias=config.gyro_bias_deg_h * DEG_PER_HOUR,
         accel_bias=math.hypot(config.accel_bias_mg * MILLI_G, config.scale_factor * STANDARD_GRAVITY),
+        scale_factor=config.scale_factor,
     )
 
 
