@@ -23,7 +23,7 @@ from landsim.log import AXES, CALIBRATION, COLUMNS, ENDS, LINES, QUANTITIES
 from landsim.navigation import FrameResult, Known, Navigator
 from landsim.plugins.guard import WITHOUT_BIASES, Belief, GuardedEstimator
 from landsim.sensors import Imu, View
-from landsim.state import Command, Phase, Stage
+from landsim.state import Command, NavState, Phase, Stage
 from landsim.truth import AFTER_MOTION, MOTION, NUMBERS, Truth
 from landsim.units import DEG, DEG_PER_HOUR
 
@@ -40,6 +40,10 @@ FRAME = {
     "roll": 1, "late": 1, "nis_dof": 1, "nis": 1, "accepted": 1, "lines_found": 1, "lines_believed": 1,
 }  # fmt: skip
 """The single numbers that `Recorder.frame` takes down, in its order."""
+
+
+STATED = ("phase", "stage", "lateral_protection", "vertical_protection", "alarm")
+"""What `Recorder.command` takes down after the command, in its order."""
 
 
 def _columns(rows: int, numbers: Iterable[float]) -> Array:
@@ -192,10 +196,10 @@ class Recorder:
                 self._augmented.append(running.calibration_covariance)
                 self._calibration_rows.append(self._count)
 
-    def command(self, command: Command, phase: Phase, stage: Stage) -> None:
-        """Take down what holds from this step to the next frame."""
+    def command(self, command: Command, phase: Phase, stage: Stage, nav: NavState) -> None:
+        """Take down what holds from this step to the next frame: the command, and what guidance was given for it."""
         self._commands += command
-        self._commands += (phase, stage)
+        self._commands += (phase, stage, nav.lateral_protection, nav.vertical_protection, nav.alarm)
         self._command_rows.append(self._count)
 
     def table(self) -> dict[str, Array]:
@@ -209,10 +213,12 @@ class Recorder:
         pitot, tilt, reading = step["pitot"], step["tilt"], step["reading"]
         commands = _columns(len(self._command_rows), self._commands)
         held = np.diff(np.append(self._command_rows, self._count))
-        command = _named(np.repeat(commands, held, axis=1), dict.fromkeys((*Command._fields, "phase", "stage"), 1))
+        command = _named(np.repeat(commands, held, axis=1), dict.fromkeys((*Command._fields, *STATED), 1))
 
         log["time_s"] = step["time"]
-        log["phase"], log["stage"] = command["phase"], command["stage"]
+        log["phase"], log["stage"], log["alarm"] = command["phase"], command["stage"], command["alarm"]
+        log["lateral_protection_m"] = command["lateral_protection"]
+        log["vertical_protection_m"] = command["vertical_protection"]
         _pose(log, "true", true, self._mount.lever, tilt, *self._turned)
         lower, pan, roll = self._misalignment()
         _pose(log, "fused", fused, self._mount.lever, reading + lower, pan, roll)
@@ -244,7 +250,7 @@ class Recorder:
         """Leave out the last frame and its command if what came after it in the same step raised."""
         if self._command_rows and self._command_rows[-1] == self._count:
             del self._command_rows[-1]
-            del self._commands[-len(Command._fields) - 2 :]
+            del self._commands[-len(Command._fields) - len(STATED) :]
         if self._update_rows and self._update_rows[-1] == self._count:
             del self._frames[-len(FRAME) :]
             images = self._lines, self._true_ends, self._seen_ends, self._faults

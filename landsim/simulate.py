@@ -244,7 +244,7 @@ def _fly(
             else:
                 nav = navigator.state(truth.time)
             command, phase = guidance.guide(nav)
-            recorder.command(command, phase, navigator.stage)
+            recorder.command(command, phase, navigator.stage, nav)
             plant.command(command)
         recorder.step(truth, navigator, airspeed, mount.tilt, tilt_reading)
         if phase is Phase.GO_AROUND:

@@ -100,8 +100,8 @@ class NavState(NamedTuple):
     """From the pitot tube, m/s."""
     stage: Stage
     lateral_protection: float = math.nan
-    """Of the midpoint of the main wheels, m: what its lateral error exceeds with no more than the stated risk; NaN
-    where navigation states none."""
+    """Of the centre of gravity, m: what its lateral error exceeds with no more than the stated risk; NaN where
+    navigation states none."""
     vertical_protection: float = math.nan
     alarm: Alarm = Alarm.NONE
     side_force: float = 0.0

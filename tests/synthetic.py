@@ -11,7 +11,9 @@ from landsim.config import (
     ApproachConfig,
     BoxConfig,
     CameraConfig,
+    FaultConfig,
     GearConfig,
+    GoAroundConfig,
     NavigationConfig,
     RunwayConfig,
     SimulationConfig,
@@ -29,7 +31,9 @@ def empty_log(rows: int) -> dict[str, Array]:
     """All columns, zero, but NaN in what only a camera frame or a filter gives."""
     log: dict[str, Array] = {column.name: np.zeros(rows) for column in COLUMNS}
     for name, values in log.items():
-        if name.startswith(("vision_", "fused_", "sigma_", "nis", "nees", "accepted", *LINES)):
+        if name.startswith(
+            ("vision_", "fused_", "sigma_", "nis", "nees", "accepted", "fault", *LINES)
+        ) or name.endswith("_protection_m"):
             values[:] = math.nan
     log["time_s"] = STEP * np.arange(rows, dtype=float)
     return log
@@ -188,6 +192,8 @@ def parts() -> tuple[Any, Any]:
         runway=RunwayConfig(width_m=30.0, length_m=2000.0),
         approach=ApproachConfig(glide_slope_deg=3.0, aim_point_m=145.0),
         camera=CameraConfig(width_px=WIDTH_PX, height_px=HEIGHT_PX),
+        fault=FaultConfig(),
+        go_around=GoAroundConfig(),
         navigation=NavigationConfig(gate_early=22.5, gate_late=18.5),
         simulation=SimulationConfig(time_limit_s=120.0),
         box=BoxConfig(
