@@ -48,6 +48,7 @@ A module imports from those below it only; a contract in the checks holds this.
 ``go_around``, ``wind_law``          when a landing is given up; what is flown besides in wind
 ``omniscient``                       the true state in place of navigation's, for comparison
 ``metrics``                          log to touchdown, tracking, navigation errors; pure
+``alarms``                           what navigation stated of itself, beside what was true; pure
 ``scene``                            from a scenario's settings to its runway and its aircraft's incidence
 ``config``, ``schema``               TOML to frozen, validated models
 ``resources``                        finds the shipped aircraft and scenarios

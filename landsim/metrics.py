@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from landsim.alarms import integrity
 from landsim.log import QUANTITIES
 from landsim.state import Phase
 from landsim.units import DEG
@@ -201,7 +202,10 @@ def judge(
 def box_limits(
     touchdown: Touchdown | None, stop_y: float | None, outcome: str, box: "BoxConfig"
 ) -> dict[str, dict[str, Any]]:
-    """Each limit of the scenario's box: ``value``, ``limit``, and whether it is ``ok`` (not without a value)."""
+    """Each limit of the scenario's box: ``value``, ``limit``, and whether it is ``ok`` (not without a value).
+
+    ``margin`` is what is left of it, negative beyond it, in its unit; None without a value.
+    """
     t = touchdown
     upper: dict[str, tuple[float | None, float]] = {
         "along_max_m": (None if t is None else t.x, box.along_max_m),
@@ -211,15 +215,17 @@ def box_limits(
         "stop_cross_max_m": (None if stop_y is None else abs(stop_y), box.stop_cross_max_m),
     }
     along = None if t is None else t.x
-    lower = {"value": along, "limit": box.along_min_m, "ok": along is not None and along >= box.along_min_m}
     return {
-        "outcome": {"value": outcome, "limit": "landed", "ok": outcome == "landed"},
-        "along_min_m": lower,
-        **{
-            key: {"value": value, "limit": limit, "ok": value is not None and value <= limit}
-            for key, (value, limit) in upper.items()
-        },
+        "outcome": {"value": outcome, "limit": "landed", "ok": outcome == "landed", "margin": None},
+        "along_min_m": _limit(along, box.along_min_m, -1.0),
+        **{key: _limit(value, limit, 1.0) for key, (value, limit) in upper.items()},
     }
+
+
+def _limit(value: float | None, limit: float, side: float) -> dict[str, Any]:
+    """A limit that a number is beyond above it (side 1) or below it (-1)."""
+    margin = None if value is None else side * (limit - value)
+    return {"value": value, "limit": limit, "ok": margin is not None and margin >= 0.0, "margin": margin}
 
 
 def tracking_errors(log: Log, glide_slope_deg: float, aim_point_m: float) -> dict[str, Array]:
@@ -339,10 +345,11 @@ def flight_metrics(
     Returns
     -------
     dict
-        ``scenario``, ``seed``, ``outcome``, ``reason``, ``start``, ``in_box``, ``box`` (a limit: value, limit, ok),
-        ``touchdown``, ``bounces``, ``stop``, ``tracking`` (of the cg, to the touchdown; the glide slope also to the
-        flare, which leaves it), ``navigation`` (of the camera, to the touchdown), ``consistency``, ``coverage``,
-        ``end``, ``flight_time_s``, ``wall_time_s``, ``versions``.  Every ``p95`` is of the magnitude.
+        ``scenario``, ``seed``, ``outcome``, ``reason``, ``start``, ``in_box``, ``box`` (a limit: value, limit, ok,
+        margin), ``touchdown``, ``bounces``, ``stop``, ``tracking`` (of the cg, to the touchdown; the glide slope also
+        to the flare, which leaves it), ``navigation`` (of the camera, to the touchdown), ``consistency``,
+        ``coverage``, ``integrity`` (of `landsim.alarms.integrity`), ``end``, ``flight_time_s``, ``wall_time_s``,
+        ``versions``.  Every ``p95`` is of the magnitude.
 
     Raises
     ------
@@ -362,9 +369,9 @@ def flight_metrics(
     box = box_limits(touchdown, None if stop is None else stop["y_m"], verdict.outcome, scenario.box)
     if scenario.simulation.end == "touchdown":
         del box["stop_cross_max_m"]
-    rows = np.arange(n)
+    rows, end_row = np.arange(n), n if touchdown is None else touchdown.row
     flown = log["body_x_m"] >= BEGIN
-    airborne = flown & (rows < (n if touchdown is None else touchdown.row))
+    airborne = flown & (rows < end_row)
     deviations = tracking_errors(log, scenario.approach.glide_slope_deg, scenario.approach.aim_point_m)
     return {
         "scenario": scenario.name,
@@ -381,9 +388,12 @@ def flight_metrics(
             **{name: _summary(values[airborne]) for name, values in deviations.items()},
             "glide_slope_to_flare_m": _summary(deviations["glide_slope_m"][flown & (rows < flare_row(log, touchdown))]),
         },
-        "navigation": navigation_errors(log, n if touchdown is None else touchdown.row),
+        "navigation": navigation_errors(log, end_row),
         "consistency": consistency(log, touchdown),
         "coverage": coverage(log, touchdown),
+        "integrity": integrity(
+            log, end_row, scenario.go_around.decision_height_m, wrong=scenario.fault.kind == "wrong"
+        ),
         "end": end,
         "flight_time_s": float(log["time_s"][-1]) if n else 0.0,
         "wall_time_s": wall_time_s,

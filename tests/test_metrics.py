@@ -176,7 +176,14 @@ def test_outcome(end: str, changes: dict[str, dict[int, float]], outcome: str, r
 
 
 def test_a_landing_within_every_limit_is_in_the_box() -> None:
-    assert measured(landing())["in_box"]
+    found = measured(landing())
+    assert found["in_box"]
+    # 203.054 m past the threshold, on the centreline, at 0.72 of 1 m/s
+    margins = {key: limit["margin"] for key, limit in found["box"].items() if key != "outcome"}
+    assert margins == pytest.approx({
+        "along_min_m": 103.05393, "along_max_m": 246.94607, "cross_max_m": 2.0, "sink_max_mps": 0.28,
+        "bank_max_deg": 3.0, "stop_cross_max_m": 3.0,
+    })  # fmt: skip
     assert not measured(landing(), "timeout")["in_box"]
 
 
@@ -203,12 +210,16 @@ def test_each_limit_of_the_box(key: str, changes: dict[str, dict[int, float]], v
     assert [name for name, limit in found["box"].items() if not limit["ok"]] == [key]
     assert found["box"][key]["value"] == pytest.approx(value)
     assert found["box"][key]["limit"] == getattr(SCENARIO.box, key)
+    beyond = value - found["box"][key]["limit"] if key != "along_min_m" else found["box"][key]["limit"] - value
+    assert found["box"][key]["margin"] == pytest.approx(-beyond)
+    assert beyond > 0.0
 
 
 def test_the_box_needs_a_touchdown_and_a_stop() -> None:
     found = measured(empty_log(0), "trim_failed")
     assert found["touchdown"] is None
     assert not any(limit["ok"] for limit in found["box"].values())
+    assert {limit["margin"] for limit in found["box"].values()} == {None}
     running = measured(landing(), "timeout")
     assert running["stop"] is None
     assert not running["box"]["stop_cross_max_m"]["ok"]
