@@ -16,6 +16,9 @@ NO_TOUCHDOWN: dict[str, Any] = dict.fromkeys(
     )
 )  # fmt: skip
 
+NEVER = ("wrong_line_alarm_s", "unaided_alarm_s", "inconsistent_alarm_s", "fault_at_s", "fault_detected_after_s")
+"""Of a flight in which there was no fault and no alarm."""
+
 
 def good(index: int, **changes: Any) -> Row:
     """A landing in the box of ``landing``, in its middle and on the centreline; everything by name may be changed."""
@@ -29,6 +32,8 @@ def good(index: int, **changes: Any) -> Row:
     row |= {f"nees15_mean_{phase}": 15.0 for phase in ("early", "late", "coasting", "rollout")}
     row |= {f"coverage95_{q}": 0.95 for q in QUANTITIES} | {"coverage_frames": 700}
     row |= {f"frames_{phase}": 100 for phase in ("early", "late", "coasting", "rollout")}
+    row |= {f"{name}_protection_frames": 700 for name in ("lateral", "vertical")}
+    row |= {"flagged": False, "false_alarm": False} | dict.fromkeys(NEVER)
     return row | changes
 
 

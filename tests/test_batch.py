@@ -142,6 +142,22 @@ def test_a_landing_has_its_touchdown_by_the_names_of_metrics_json(monkeypatch: p
     row = batch.row_of(scenario, type(flown)(metrics, flown.log), np.array([100.0]))
     assert {name: row[name] for name in batch.TOUCHDOWN} == {name: touchdown[name] for name in batch.TOUCHDOWN}
     assert (row["touchdown_time_s"], row["stop_y_m"], row["bounces"]) == (touchdown["time_s"], -0.25, 2)
+    # a wheel that touched on the way up is no touchdown of a landing
+    climbed = metrics | {"outcome": "go_around", "end": "go_around", "stop": None}
+    row = batch.row_of(scenario, type(flown)(climbed, flown.log), np.array([100.0]))
+    assert [row[name] for name in (*batch.TOUCHDOWN, "touchdown_time_s")] == [None] * 8
+
+
+def test_a_wrong_line_is_in_the_row_and_so_is_what_navigation_made_of_it() -> None:
+    wrong = {"navigation.aiding": "lines", "fault.kind": "wrong", "fault.at_s": 2.0, "fault.offset_m": -10.0}
+    row = flight_row(load_scenario("landing", overrides=SHORT | wrong | {"simulation.time_limit_s": 4.0}), 1, [100.0])
+    assert row["fault_at_s"] == pytest.approx(2.0, abs=1.0 / 30.0)
+    assert row["wrong_line_alarm_s"] == row["fault_at_s"] + row["fault_detected_after_s"]
+    assert 0.0 < row["fault_detected_after_s"] < 1.0
+    assert (row["unaided_alarm_s"], row["flagged"], row["false_alarm"]) == (None, True, False)
+    # a frame in 1/30 s, from when the filter starts
+    assert 60 < row["lateral_protection_frames"] == row["vertical_protection_frames"] <= 121
+    assert 0.0 < row["lateral_protection_last_m"] < row["lateral_protection_max_m"]
 
 
 def test_an_exception_is_a_row(short: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimator.so3 import Array
+from landsim.alarms import PROTECTED
 from landsim.config import Scenario
 from landsim.dispersion import dispersed, draws_of_seed, keys_of
 from landsim.errors import InputError, traceback_of
 from landsim.log import QUANTITIES, Log
 from landsim.metrics import ALL_LINES, BOTH_EDGES, CRASHES, error
 from landsim.simulate import Flight, fly, must_fly
-from landsim.state import Stage
+from landsim.state import Alarm, Stage
 
 Row: TypeAlias = dict[str, Any]
 
@@ -38,7 +39,16 @@ PHASES = ("early", "late", "coasting", "rollout")
 """Of a flight's consistency."""
 DRAW = "draw."
 """What the names of dispersed keys' columns begin with."""
+STATED: dict[str, tuple[str, type]] = {
+    "protection_frames": ("frames", int),
+    "exceeded_frames": ("exceeded_frames", int),
+    "protection_max_m": ("protection_max_m", float),
+    "protection_last_m": ("protection_last_m", float),
+}
+"""What a row has of a protection level: what it is in metrics.json, and its type."""
+INTEGRITY = ("misleading_frames", "fault_at_s", "fault_detected_after_s", "false_alarm", "flagged")
 NORMALISED = ("nees9_mean", "nees15_mean")
+ALARMS = tuple(str(alarm.name).lower() for alarm in Alarm if alarm)
 
 
 def _stated(name: str, what: str) -> str:
@@ -69,6 +79,13 @@ SCALARS: dict[str, type] = {
     **{f"frames_{phase}": int for phase in PHASES},
     **{f"coverage95_{q}": float for q in QUANTITIES},
     "coverage_frames": int,
+    **{f"{name}_{stated}": kind for name in PROTECTED for stated, (_, kind) in STATED.items()},
+    **{f"{alarm}_alarm_s": float for alarm in ALARMS},
+    "misleading_frames": int,
+    "fault_at_s": float,
+    "fault_detected_after_s": float,
+    "false_alarm": bool,
+    "flagged": bool,
     "flight_time_s": float,
     "wall_time_s": float,
 }
@@ -188,10 +205,14 @@ def lost_row(
 
 
 def row_of(scenario: Scenario, flight: Flight, distances: Array) -> Row:
-    """The row of a flight that has been flown; parameters and result as for `flight_row`."""
+    """The row of a flight that has been flown; parameters and result as for `flight_row`.
+
+    A wheel that touches while the aircraft goes around is no landing's: the row has no touchdown then.
+    """
     metrics = flight.metrics
-    touchdown, stop = metrics["touchdown"] or {}, metrics["stop"] or {}
-    consistency, coverage = metrics["consistency"], metrics["coverage"]
+    touchdown = (None if metrics["outcome"] == "go_around" else metrics["touchdown"]) or {}
+    stop = metrics["stop"] or {}
+    consistency, coverage, integrity = metrics["consistency"], metrics["coverage"], metrics["integrity"]
     row: Row = {
         "index": None,
         "seed": metrics["seed"],
@@ -214,6 +235,9 @@ def row_of(scenario: Scenario, flight: Flight, distances: Array) -> Row:
         **{f"frames_{phase}": consistency[phase]["frames"] for phase in PHASES},
         **{f"coverage95_{q}": coverage[q] for q in QUANTITIES},
         "coverage_frames": coverage["frames"],
+        **{f"{name}_{stated}": integrity[name][of] for name in PROTECTED for stated, (of, _) in STATED.items()},
+        **{f"{alarm}_alarm_s": integrity["first_alarm_s"][alarm] for alarm in ALARMS},
+        **{name: integrity[name] for name in INTEGRITY},
         "flight_time_s": metrics["flight_time_s"],
         "wall_time_s": metrics["wall_time_s"],
         **{f"{DRAW}{key}": metrics["draws"][key] for key in keys_of(scenario)},
