@@ -51,7 +51,8 @@ def integrity(log: Mapping[str, Array], end_row: int, decision_height: float, *,
         ``first_alarm_s``           when each of ``landsim.state.Alarm`` first stood
         ``fault_at_s``              of the first frame with a fault: a line missing, or another one in view
         ``fault_detected_after_s``  from a wrong line to the first of `OF_A_FAULT`
-        ``false_alarm``             whether one of these stood before there was a fault
+        ``false_alarm``             whether one of these stood before there was a fault or an error beyond its level:
+                                    that the lines contradict a state that is wrong is true
         ``flagged``                 whether any alarm stood below the decision height, or a go-around began
     """
     time, rows = log["time_s"], np.arange(log["time_s"].size)
@@ -79,6 +80,7 @@ def integrity(log: Mapping[str, Array], end_row: int, decision_height: float, *,
     fault_at = _first(time, frame & (_in_view(log) if wrong else log["fault"] > 0.0))
     warned = judged & ((alarm & OF_A_FAULT) != 0)
     first_warned = _first(time, warned)
+    causes = [at for at in (fault_at, _first(time, exceeded)) if at is not None]
     detected = _first(time, warned & (time >= fault_at)) if wrong and fault_at is not None else None
     low = judged & (log["wheel_height_m"] <= decision_height)
     return result | {
@@ -88,7 +90,7 @@ def integrity(log: Mapping[str, Array], end_row: int, decision_height: float, *,
         },
         "fault_at_s": fault_at,
         "fault_detected_after_s": None if fault_at is None or detected is None else detected - fault_at,
-        "false_alarm": first_warned is not None and (fault_at is None or first_warned < fault_at),
+        "false_alarm": first_warned is not None and all(first_warned < at for at in causes),
         "flagged": bool(climbing.any() or (low & (alarm != 0)).any()),
     }
 

@@ -118,6 +118,12 @@ def test_an_alarm_that_is_over_above_the_decision_height_flags_no_landing() -> N
     assert stated(approach(wheel_height_m=high, alarm=[(slice(0, 11), 2.0)]))["flagged"]
 
 
+def test_an_alarm_is_not_false_when_it_is_the_state_that_is_wrong() -> None:
+    for first, false in ((9, False), (11, True)):  # frames are the even rows
+        log = approach(fused_cross_m=[(slice(first, None), 9.0)], alarm=[(slice(10, 12), float(Alarm.INCONSISTENT))])
+        assert stated(log)["false_alarm"] is false
+
+
 @pytest.mark.parametrize(("row", "false"), [(8, True), (10, False), (24, False)])
 def test_an_alarm_before_any_fault_is_a_false_one(row: int, false: bool) -> None:
     assert stated(faulty("left", alarm=[(slice(row, row + 2), float(Alarm.WRONG_LINE))]))["false_alarm"] is false
