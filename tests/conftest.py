@@ -64,10 +64,10 @@ def fake_flight(scenario: str = "landing", seed: int = 0) -> FakeFlight:
         "reason": "stopped on the runway",
         "in_box": False,
         "box": {
-            "along_min_m": {"value": 265.2, "limit": 100.0, "ok": True},
-            "along_max_m": {"value": 265.2, "limit": 450.0, "ok": True},
-            "cross_max_m": {"value": 0.3125, "limit": 2.0, "ok": True},
-            "sink_max_mps": {"value": 1.25, "limit": 1.0, "ok": False},
+            "along_min_m": {"value": 265.2, "limit": 100.0, "ok": True, "margin": 165.2},
+            "along_max_m": {"value": 265.2, "limit": 450.0, "ok": True, "margin": 184.8},
+            "cross_max_m": {"value": 0.3125, "limit": 2.0, "ok": True, "margin": 1.6875},
+            "sink_max_mps": {"value": 1.25, "limit": 1.0, "ok": False, "margin": -0.25},
         },
         "touchdown": {
             "time_s": 30.0,

@@ -16,6 +16,10 @@ _NAMES = {
 }
 
 
+_STYLES = {"landed": "bold green", "go_around": "bold yellow"}
+"""Of an outcome; what is neither a landing nor given up in time went wrong."""
+
+
 def flight_tables(metrics: Mapping[str, Any], width: int = 100) -> "Iterator[RenderableType]":
     """What a flight was worth: its outcome in a line, then touchdown and stop, tracking and navigation.
 
@@ -33,7 +37,7 @@ def flight_tables(metrics: Mapping[str, Any], width: int = 100) -> "Iterator[Ren
     reason = metrics.get("reason")
     yield Text.assemble(
         f"{one_line(metrics['scenario'])}, seed {metrics['seed']}: ",
-        (metrics["outcome"], "bold green" if landed else "bold red"),
+        (metrics["outcome"], _STYLES.get(metrics["outcome"], "bold red")),
         f", {verdict}" if landed else f": {one_line(reason)}" if reason else "",
     )
     for sheet in (_touchdown(metrics), _tracking(metrics), _navigation(metrics)):
@@ -55,7 +59,8 @@ def _touchdown(metrics: Mapping[str, Any]) -> Sheet:
         kept = all(limit["ok"] for limit in known)
         told = "" if not known else "ok" if kept else "not reached" if value is None else "out"
         mark = Text(told, style="green" if kept else "red")
-        rows.append([name, number(value, unit), bounds, mark])
+        room = [limit["margin"] for limit in known if limit["margin"] is not None]
+        rows.append([name, number(value, unit), bounds, number(min(room), unit) if room else "", mark])
 
     row("past the threshold", touchdown.get("x_m"), "m", "", "along_min_m", "along_max_m")
     row("right of the centreline", touchdown.get("y_m"), "m", "±", "cross_max_m")
@@ -66,7 +71,7 @@ def _touchdown(metrics: Mapping[str, Any]) -> Sheet:
     row("ground speed", touchdown.get("ground_speed_mps"), "m/s")
     row("stop, past the threshold", stop.get("x_m"), "m")
     row("stop, right of the centreline", stop.get("y_m"), "m", "±", "stop_cross_max_m")
-    return Sheet(("touchdown", "value", "box", ""), rows)
+    return Sheet(("touchdown", "value", "box", "room", ""), rows)
 
 
 def _tracking(metrics: Mapping[str, Any]) -> Sheet:
