@@ -42,6 +42,17 @@ def aloft(index: int, **changes: Any) -> Row:
     return good(index, **(NO_TOUCHDOWN | {"outcome": "timeout", "in_box": False, "end": "timeout"} | changes))
 
 
+def around(index: int, reason: str = "no line has been believed for too long, 21.5 m up", **changes: Any) -> Row:
+    """A flight that went around."""
+    changes = {
+        "outcome": "go_around",
+        "end": "go_around",
+        "reason": f"gone around: {reason}",
+        "flagged": True,
+    } | changes
+    return good(index, **(NO_TOUCHDOWN | {"in_box": False} | changes))
+
+
 def failed(index: int, **changes: Any) -> Row:
     """A flight that raised."""
     row: Row = dict.fromkeys(good(0))

@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from flown import aloft, failed, good
+from flown import aloft, around, failed, good
 from numpy.random import default_rng
 
 from landsim.batch.compare import compare
@@ -55,6 +55,9 @@ BATCHES: dict[str, list[Row]] = {
     "no touchdown": [aloft(i) for i in range(5)],
     "no flight": [],
     "all alike": [good(i) for i in range(20)],
+    "gone around": [*(good(i) for i in range(25)), *(around(i) for i in range(25, 30))],
+    "beside the runway": [good(0), good(1, y_m=-114.0, in_box=False, outcome="off_runway")],
+    "all gone around": [around(i) for i in range(5)],
 }
 """Rows by what is particular about them."""
 

@@ -23,8 +23,8 @@ from landsim.log import QUANTITIES
 
 SCENARIO = load_scenario("landing")
 SECTIONS = [
-    "format", "batch", "rates", "touchdown", "distributions", "tracking", "envelopes", "consistency", "sensitivity",
-    "worst", "versions",
+    "format", "batch", "rates", "verdict", "touchdown", "distributions", "tracking", "envelopes", "consistency",
+    "sensitivity", "worst", "versions",
 ]  # fmt: skip
 
 

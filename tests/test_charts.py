@@ -17,6 +17,7 @@ from reported import BATCHES, COMPARISONS, comparison, ordinary, summary
 from landsim.charts.batch import SECTIONS, batch_charts
 from landsim.charts.comparison import comparison_charts
 from landsim.charts.extent import extent, names_above
+from landsim.charts.landing import FARTHEST
 from landsim.charts.model import (
     Axis,
     Band,
@@ -100,7 +101,7 @@ def test_every_number_of_a_chart_stands_in_the_file(summaries: dict[str, dict[st
     ]
     half = [0.5 * found["touchdown"]["runway"]["width_m"]] if "touchdown" in found else []
     scaled = [stated * factor for factor in (1.0, -1.0, 100.0, 1.0 / 9.0, 1.0 / 15.0, 1.959963984540054)]
-    known = np.sort(np.concatenate([*scaled, shares, at_ends, half, np.negative(half), [0.0, 1.0]]))
+    known = np.sort(np.concatenate([*scaled, shares, at_ends, half, np.negative(half), [0.0, 1.0, FARTHEST]]))
     count = 0
     for chart in charts_of(found):
         for panel in chart.panels:

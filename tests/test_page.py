@@ -22,8 +22,8 @@ from landsim.report import write_comparison, write_report
 
 TOML = 'kind = "flight"\n\n[aircraft]\nname = "pioneer"\n'
 BATCH = [
-    "summary", "outcomes", "touchdown", "distributions", "tracking", "navigation", "consistency", "sensitivity",
-    "worst", "scenario", "versions",
+    "summary", "verdict", "outcomes", "touchdown", "distributions", "tracking", "navigation", "consistency",
+    "sensitivity", "worst", "scenario", "versions",
 ]  # fmt: skip
 COMPARISON = ["summary", "outcomes", "settings", "differences", "distributions", "navigation"]
 VOID = {"meta", "link", "line", "rect", "circle", "path", "br"}
@@ -109,7 +109,16 @@ def test_a_page_has_its_sections_in_order_with_something_in_each(kind: str, page
         assert one.attributes["aria-labelledby"] == title.attributes["id"]
         assert len(one.text) > len(title.text) + 20
         assert one.all("figure", "table", "p", "pre")
-    drawn = {"outcomes", "touchdown", "distributions", "tracking", "navigation", "consistency", "sensitivity"}
+    drawn = {
+        "verdict",
+        "outcomes",
+        "touchdown",
+        "distributions",
+        "tracking",
+        "navigation",
+        "consistency",
+        "sensitivity",
+    }
     with_figure = {one.attributes["id"] for one in root.all("section") if one.all("figure")}
     assert with_figure == (drawn if kind == "batch" else {"outcomes", "differences", "distributions", "navigation"})
 

@@ -114,6 +114,27 @@ def mean_interval(values: Array) -> Interval:
     return Interval(mean - half, mean + half)
 
 
+def ratio_interval(counts: Array, of: Array) -> Interval:
+    """Interval of a share whose parts come in groups that are not independent: Σ counts / Σ of.
+
+    Student's over the groups (n,), with the variance of a ratio by its linearisation: the residuals counts - share · of
+    over the mean of ``of``; W. Cochran, Sampling Techniques, 3rd ed., 2.11.  Within 0 and 1; of fewer than two groups
+    None.
+
+    Parameters
+    ----------
+    counts, of : (n,) array
+        0 <= counts <= of, and something in ``of``.
+    """
+    n = counts.size
+    if n < 2:
+        return NOTHING
+    share = float(counts.sum() / of.sum())
+    residuals = (counts - share * of) / np.mean(of)
+    half = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, n - 1) * math.sqrt(np.sum(residuals**2) / (n - 1) / n))
+    return Interval(max(share - half, 0.0), min(share + half, 1.0))
+
+
 def chi_square_bounds(dof: int, n: int) -> Interval:
     """Within which the mean of n independent χ² numbers of so many degrees of freedom is with `CONFIDENCE`."""
     if n == 0:

@@ -13,13 +13,14 @@ from landsim.batch.sections.rates import rates
 from landsim.batch.sections.sensitivity import sensitivity
 from landsim.batch.sections.touchdown import touchdown
 from landsim.batch.sections.tracking import tracking
+from landsim.batch.sections.verdict import verdict
 from landsim.batch.sections.words import span_of
 from landsim.batch.sections.worst import worst
 from landsim.batch.stats import CONFIDENCE
 from landsim.config import Scenario
 from landsim.plain import as_json
 
-FORMAT = 1
+FORMAT = 2
 """Of the summary; another one has other keys."""
 
 
@@ -51,6 +52,19 @@ def summarise(scenario: Scenario, flights: Flights, identity: Mapping[str, Any])
         ``rates``                 ``success`` (landed in the box) and ``landed``: rates; ``outcomes``: [``outcome``,
                                   rate]; ``limits``: [``key``, ``title``, ``unit``, ``limit``, ``side``, ``of``, rate
                                   of those that missed it]; ``can_show``; ``text``: [sentence]
+        ``verdict``               ``limits`` (of the box) and ``tracking``: [``key``, ``title``, ``unit``, ``limit``,
+                                  ``side``, ``of``, ``source``, rate of those beyond it, ``below``: what n of them
+                                  show, one-sided; ``quantile`` (99 % towards the limit) {``p``, ``value``, ``low``,
+                                  ``high``}, ``margin`` to it, ``worst``, ``margin_of_worst``, ``used``: shares of the
+                                  limit, ``criterion`` that it stands for {``rate``, ``text``, ``source``}];
+                                  ``outcomes``: [``key``, ``title``, rate], which together are all flights; ``harm``:
+                                  rate of those that came down badly without a flag, and ``below``; ``go_arounds``:
+                                  [``reason``, rate]; ``protection`` {``risk``, ``levels``: [``name``, ``flights``:
+                                  rate of those with any error beyond it, ``frames``, ``exceeded_frames``, ``share``
+                                  and its interval, ``state`` (kept, more, open), ``last_m``], ``misleading``: rate of
+                                  flights with any such frame while no alarm stood, and ``frames``}; ``faults``
+                                  {``monitored``, ``within_s``, ``detected`` within it, ``detected_ever`` and
+                                  ``false_alarms``: rates; ``median_s``, ``longest_s``}; ``text``
         ``touchdown``             ``points`` (columns), ``ellipses``: [``level`` (%), ``center`` or None,
                                   ``semi_major_m``, ``semi_minor_m``, ``angle_deg`` from x towards y, ``polygon``
                                   {``x_m``, ``y_m``}, ``inside``: rate], ``box``, ``runway``, ``aim_point_m``, ``text``
@@ -90,6 +104,7 @@ def summarise(scenario: Scenario, flights: Flights, identity: Mapping[str, Any])
                 "format": FORMAT,
                 "batch": _batch(scenario, flights, identity, sampling),
                 "rates": rates(scenario, flights, sampling),
+                "verdict": verdict(scenario, flights),
                 "touchdown": touchdown(scenario, flights),
                 "distributions": distributions(scenario, flights),
                 "tracking": tracking(flights),

@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from landsim.charts.landing import distribution_charts, rate_charts, touchdown_charts, tracking_charts
+from landsim.charts.landing import distribution_charts, margin_charts, rate_charts, touchdown_charts, tracking_charts
 from landsim.charts.model import Chart
 from landsim.charts.navigation import consistency_charts, envelope_charts, sensitivity_charts
 from landsim.charts.shared import flown
 
 SECTIONS = {
+    "verdict": margin_charts,
     "outcomes": rate_charts,
     "touchdown": touchdown_charts,
     "distributions": distribution_charts,

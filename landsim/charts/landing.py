@@ -1,6 +1,6 @@
 """How often a batch landed, where, and how well: charts of the summary's rates, touchdown, distributions, tracking."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,6 +12,7 @@ from landsim.charts.model import (
     Histogram,
     Limit,
     Mark,
+    Numbers,
     Panel,
     Points,
     Region,
@@ -19,6 +20,7 @@ from landsim.charts.model import (
     Tone,
 )
 from landsim.charts.shared import (
+    PERCENT,
     beyond,
     floor_of,
     limits_near,
@@ -27,6 +29,8 @@ from landsim.charts.shared import (
     rates,
     several,
     share_floor,
+    there,
+    times,
     unit_of,
     with_unit,
 )
@@ -37,16 +41,84 @@ FIRST = ("sink_rate_mps", "y_m", "x_m", "bank_deg", "ground_speed_mps")
 """Measures that stand in the first chart of distributions; the others are in a second."""
 NONE_MISSED = "a bar without a point: no flight was beyond it"
 NO_LIMIT_MISSED = " No flight was beyond a limit of the box."
+FARTHEST = 250.0
+"""Of a limit's use no more is drawn, %: one flight beside the runway would leave no room for the others."""
 SHORT = 60.0
 """Of the approach before the threshold this much is drawn with the runway, m."""
 BANDED = "; the tint is the 95 % confidence of the share, and where no flight is left it says what so many still allow"
+
+
+def margin_charts(summary: Mapping[str, Any]) -> tuple[Chart, ...]:
+    """How much of each limit the flights used: of the box, and of the tracking criteria."""
+    found = summary["verdict"]
+    entries = [one for one in (*found["limits"], *found["tracking"]) if one["n"]]
+    if not entries:
+        return ()
+    names = tuple(
+        f"{one['title']} {'>' if one['side'] == 'above' else '<'} {with_unit(one['limit'], one['unit'])}"
+        for one in entries
+    )
+    rows = tuple(range(len(entries)))
+    hover = tuple(
+        f"worst {with_unit(one['worst'], one['unit'])}, limit {with_unit(one['limit'], one['unit'])}" for one in entries
+    )
+
+    def at(level: float) -> Numbers:
+        by_level = ({q["p"]: q["value"] for q in one["used"]["quantiles"]} for one in entries)
+        return _near(times((values.get(level) for values in by_level), PERCENT))
+
+    worst = times((one["used"]["worst"] for one in entries), PERCENT)
+    series: list[Series] = []
+    if there(median := at(0.5)):
+        bar = (at(0.05), at(0.95)) if there(at(0.95)) else None
+        name = "median, and from 5 % to 95 % of the flights" if bar else "median"
+        series.append(Points(name, _within(median), rows, "blue", size=5.0, x_bar=bar, bar_width=3.0))
+    if there(_within(at(0.99))):
+        series.append(Points("99 % quantile", _within(at(0.99)), rows, "blue", "ring", 6.0))
+    far = tuple(value is not None and value > FARTHEST for value in worst)
+    looks: tuple[tuple[str, bool, Mark], ...] = (
+        ("worst flight", False, "cross"),
+        (f"worst flight, beyond {FARTHEST:g} %", True, "triangle"),
+    )
+    for name, farther, mark in looks:
+        chosen = [row for row in rows if far[row] is farther]
+        if chosen:
+            x, told = _near(worst[row] for row in chosen), tuple(hover[row] for row in chosen)
+            series.append(Points(name, x, tuple(chosen), "vermilion", mark, 5.0, told))
+    most = max(value for value in worst if value is not None)
+    panel = Panel(
+        Axis("used of the limit", "%", span=(-3.0, min(max(110.0, 1.05 * most), 1.03 * FARTHEST))),
+        Axis("", ticks=names),
+        tuple(series),
+        (Limit("x", PERCENT, "limit"),),
+        height=0.2 + 0.12 * len(entries),
+    )
+    caption = (
+        "100 % is at the limit, more is beyond it. The longitudinal touchdown uses nothing of either limit in the"
+        " middle of the box. The tracking criteria are published ones, the other limits the scenario's."
+    )
+    return (Chart("margins", "How much of each limit was used", (panel,), 1, caption),)
+
+
+def _near(values: Iterable[float | None]) -> Numbers:
+    """Shares (%) that are beyond an end of the axis at that end."""
+    return tuple(None if value is None else min(max(value, 0.0), FARTHEST) for value in values)
+
+
+def _within(values: Numbers) -> Numbers:
+    """Without those at the far end, where the worst one stands for them."""
+    return tuple(None if value == FARTHEST else value for value in values)
 
 
 def rate_charts(summary: Mapping[str, Any]) -> tuple[Chart, ...]:
     """Success and outcomes with their intervals, and how often each limit was missed."""
     found = summary["rates"]
     rows: list[tuple[str, Mapping[str, Any]]] = [("landed in the box", found["success"]), ("landed", found["landed"])]
-    rows += [(one["outcome"], one) for one in found["outcomes"] if one["count"] and one["outcome"] != "landed"]
+    rows += [
+        (one["outcome"].replace("_", " "), one)
+        for one in found["outcomes"]
+        if one["count"] and one["outcome"] != "landed"
+    ]
     rows = [(name, entry) for name, entry in rows if entry["rate"] is not None]
     if not rows:
         return ()

@@ -9,6 +9,7 @@ from landsim.page.document import Block, Cell, Code, Document, Fact, Section, Ta
 from landsim.page.landing import distributions_blocks, outcomes_blocks, touchdown_blocks, tracking_blocks
 from landsim.page.navigation import consistency_blocks, navigation_blocks, sensitivity_blocks
 from landsim.page.sentences import DASH, interval
+from landsim.page.verdict import verdict_blocks
 
 AGAIN = (
     "The same scenario, seed and versions on the same kind of machine give the same flights. Flight i has the seed of"
@@ -35,6 +36,7 @@ def batch_document(summary: Mapping[str, Any], scenario_toml: str, folder: str) 
     charts = batch_charts(summary)
     sections = (
         Section("summary", "Summary", _summary(summary)),
+        Section("verdict", "Verdict", verdict_blocks(summary, charts)),
         Section("outcomes", "Outcomes", outcomes_blocks(summary, charts)),
         Section("touchdown", "Touchdown", touchdown_blocks(summary, charts)),
         Section("distributions", "Distributions", distributions_blocks(summary, charts)),
@@ -103,7 +105,7 @@ def _worst(summary: Mapping[str, Any], folder: str) -> tuple[Block, ...]:
             (
                 str(one["rank"]),
                 str(one["index"]),
-                one["outcome"],
+                one["outcome"].replace("_", " "),
                 "yes" if one["in_box"] else "no",
                 one["reason"] or DASH,
                 nearest,

@@ -17,7 +17,7 @@ def outcomes_blocks(summary: Mapping[str, Any], charts: Charts) -> tuple[Block, 
     percentage = f"{100.0 * rates['confidence']:g} % interval"
     ended = (
         rate_row("landed in the box", rates["success"]),
-        *(rate_row(one["outcome"], one) for one in rates["outcomes"]),
+        *(rate_row(one["outcome"].replace("_", " "), one) for one in rates["outcomes"]),
     )
     limits = tuple(
         (

@@ -20,7 +20,7 @@ OVERDUE = "took longer than the limit"
 
 
 def batch_tables(summary: Mapping[str, Any], width: int = 100) -> "Iterator[RenderableType]":
-    """Outcomes, touchdown and the worst flights of a batch.
+    """The verdict, outcomes, touchdown and the worst flights of a batch.
 
     Parameters
     ----------
@@ -37,7 +37,9 @@ def batch_tables(summary: Mapping[str, Any], width: int = 100) -> "Iterator[Rend
         (f"{rate_text(rates['success'])} in the box", "bold"),
         f", with {100.0 * of['confidence']:g} % confidence",
     )
-    for sheet in (_outcomes(rates), _touchdown(summary), _worst(summary)):
+    if rates["gone_around"]["count"]:
+        yield Text(f"{rate_text(rates['gone_around'])} went around, which is neither a landing nor a failure")
+    for sheet in (_outcomes(rates), _verdict(summary), _touchdown(summary), _worst(summary)):
         if sheet.rows:
             yield from fitting(sheet, width)
 
@@ -71,6 +73,18 @@ def _outcomes(rates: Mapping[str, Any]) -> Sheet:
         if outcome["count"]
     ]
     return Sheet(("outcome", "flights", "rate"), rows)
+
+
+def _verdict(summary: Mapping[str, Any]) -> Sheet:
+    """The room to each limit of the box: flights beyond it, and what is left at the 99 % quantile and in the worst."""
+    rows: list[list[str | Text]] = []
+    for one in summary["verdict"]["limits"] if summary["batch"]["n"] else ():
+        unit = UNITS.get(one["unit"], one["unit"])
+        sign = "≤" if one["side"] == "above" else "≥"
+        limit = f"{sign} {one['limit']:g}{'' if unit == '°' else ' '}{unit}"
+        margins = (number(one[key], unit) for key in ("margin", "margin_of_worst"))
+        rows.append([one["title"], limit, f"{one['count']} of {one['n']}", *margins])
+    return Sheet(("limit on", "limit", "beyond", "room,\n99 %", "room,\nworst"), rows)
 
 
 def _touchdown(summary: Mapping[str, Any]) -> Sheet:

@@ -3,6 +3,7 @@
 ::
 
     rates          how often, with intervals, and what n can and cannot show
+    verdict        room to each limit, what nobody was warned of, go-arounds, navigation's word against the truth
     touchdown      where, with ellipses
     distributions  how well: quantiles, histograms, exceedance
     tracking       deviation from the glide slope and the centreline, beside published criteria

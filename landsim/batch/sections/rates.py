@@ -22,17 +22,19 @@ def rates(scenario: Scenario, flights: Flights, sampling: str) -> dict[str, Any]
     landed = flights.are("outcome", "landed")
     others = sorted({str(o) for o in flights.columns["outcome"]} - set(OUTCOMES))
     success = rate(int(in_box.sum()), n)
+    gone_around = rate(int(flights.are("outcome", "go_around").sum()), n)
     result: dict[str, Any] = {
         "confidence": CONFIDENCE,
         "interval": "Clopper-Pearson, two-sided",
         "success": success,
         "landed": rate(int(landed.sum()), n),
+        "gone_around": gone_around,
         "outcomes": [
             {"outcome": outcome, **rate(int(flights.are("outcome", outcome).sum()), n)}
             for outcome in (*OUTCOMES, *others)
         ],
         "limits": [],
-        "can_show": can_show(n - success["count"], n),
+        "can_show": can_show(n - success["count"] - gone_around["count"], n),
     }
     for limit in box_of(scenario):
         values = flights.numbers(limit.measure.key)
@@ -53,7 +55,10 @@ def rates(scenario: Scenario, flights: Flights, sampling: str) -> dict[str, Any]
 
 
 def can_show(failures: int, n: int) -> dict[str, Any]:
-    """What so many flights with so many failures bound, and what they would have seen; every bound one-sided, exact."""
+    """What so many flights with so many failures bound, and what they would have seen; every bound one-sided, exact.
+
+    A landing that was given up is no failure.
+    """
     return {
         "n": n,
         "failures": failures,
@@ -87,6 +92,14 @@ def _text(found: dict[str, Any], n: int, sampling: str) -> list[str]:
     )
     needed_text = f"Without a single failure it takes {needed} to show that the rate of failure is below it."
     text = [rate_text, bound_text, seen_text, needed_text]
+    around = found["gone_around"]
+    if around["count"]:
+        text.insert(
+            1,
+            f"{around['count']} of {n} went around, {number(100.0 * around['rate'], 4)} %, between"
+            f" {number(100.0 * around['low'], 4)} % and {number(100.0 * around['high'], 4)} %: neither a landing nor a"
+            " failure.",
+        )
     if sampling != "random":
         text.append(
             f"The draws are by {sampling}, and so not independent of each other: the intervals, which are for"

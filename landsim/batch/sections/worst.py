@@ -14,21 +14,21 @@ from landsim.config import Scenario
 MOST = 10
 RULE = (
     "flights that did not land first, those without a touchdown before the others; then by the largest share of a limit"
-    " of the box that was used: 1 is at the limit, more is beyond it"
+    " of the box that was used: 1 is at the limit, more is beyond it; those that went around last"
 )
 HINTS = 3
 """Draws that are named for a flight."""
 
 
 def worst(scenario: Scenario, flights: Flights) -> dict[str, Any]:
-    """The section ``worst``: what did not land first, then those that used most of a limit."""
-    landed = flights.are("outcome", "landed")
+    """The section ``worst``: what did not land first, then those that used most of a limit, and go-arounds last."""
+    group = flights.are("outcome", "landed") + 2 * flights.are("outcome", "go_around").astype(int)
     box = box_of(scenario)
     used = np.stack([limit.used(flights.numbers(limit.measure.key)) for limit in box], axis=1)
     known = np.asarray(np.isfinite(used).any(axis=1))
     score = np.where(known, np.max(np.where(np.isfinite(used), used, -np.inf), axis=1, initial=-np.inf), np.inf)
     # stable: of equal ones the lower index comes first; a flight without a touchdown has no score, and is the worst
-    order = np.lexsort((np.arange(flights.n), -score, landed))[:MOST]
+    order = np.lexsort((np.arange(flights.n), -score, group))[:MOST]
     inputs = inputs_of(flights)
     found = []
     for rank, i in enumerate(order.tolist(), 1):
