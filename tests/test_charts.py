@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 import pytest
-from flown import good
+from flown import failed, good
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 from reported import BATCHES, COMPARISONS, comparison, ordinary, summary
@@ -174,6 +174,31 @@ def test_touchdowns_stand_on_the_runway_in_or_out_of_the_box(summaries: dict[str
     assert len({one.dash for one in ellipses}) == 3
     for one in ellipses:
         assert (one.x[0], one.y[0]) == (one.x[-1], one.y[-1])
+
+
+def test_margins_are_drawn_as_shares_of_their_limits() -> None:
+    """Sink rates 0 to 0.995 of 1 m/s; one flight 4 m beside a box of 2 m, and one 114 m."""
+    rows = [good(i, sink_rate_mps=0.005 * i, y_m={7: -4.0}.get(i, 0.0)) for i in range(200)]
+    (chart,) = batch_charts(summary(rows))["verdict"]
+    (panel,) = chart.panels
+    assert len(panel.y.ticks) == 8
+    at = {series.name: series for series in panel.series if isinstance(series, Points)}
+    assert list(at) == ["median, and from 5 % to 95 % of the flights", "99 % quantile", "worst flight"]
+    sink, lateral = panel.y.ticks.index("sink rate > 1 m/s"), panel.y.ticks.index("|lateral touchdown| > 2 m")
+    middle, tail, worst = at.values()
+    assert middle.x_bar is not None
+    assert (middle.x[sink], middle.x_bar[0][sink], middle.x_bar[1][sink]) == pytest.approx((49.75, 4.975, 94.525))
+    assert (tail.x[sink], worst.x[sink], worst.x[lateral]) == pytest.approx((98.505, 99.5, 200.0))
+    assert any(isinstance(one, Limit) and (one.along, one.at) == ("x", 100.0) for one in panel.mentions)
+    rows[8]["y_m"] = -114.0
+    (panel,) = batch_charts(summary(rows))["verdict"][0].panels
+    *_, near, far = panel.series
+    assert isinstance(near, Points)
+    assert isinstance(far, Points)
+    assert (far.x, far.y, far.mark) == ((FARTHEST,), (lateral,), "triangle")
+    assert lateral not in near.y
+    assert "worst 114 m" in far.hover[0]
+    assert batch_charts(summary([failed(0)]))["verdict"] == ()
 
 
 def test_the_share_beyond_goes_down_in_steps_and_its_band_on_to_the_limit() -> None:

@@ -18,6 +18,8 @@ from typing import Any
 
 import pytest
 from conftest import fake_flight
+from flown import around, good
+from reported import summary
 from rich.console import Console
 
 from landsim import __version__, cli
@@ -468,6 +470,23 @@ class TestTables:
             assert "landing, 1 flight from seed 0 on" in text
             assert told in text
             assert max(map(len, text.splitlines())) <= 40
+
+    @pytest.mark.parametrize("width", [100, 60, 44])
+    def test_a_batch_has_its_go_arounds_and_the_room_to_its_limits(self, width: int) -> None:
+        rows = [*(good(i, y_m=-2.5 if i == 3 else 0.0, in_box=i != 3) for i in range(9)), around(9)]
+        console = Console(width=width, file=io.StringIO())
+        with console.capture() as captured:
+            for table in batch_tables(summary(rows), width):
+                console.print(table, crop=False)
+        text = captured.get()
+        assert max(map(len, text.splitlines())) <= width
+        words = " ".join(text.split())
+        assert "10 % (0.2529 … 44.5) went around, which is neither a landing nor a failure" in words
+        assert "1 of 9" in words
+        assert "-0.500 m" in words
+        if width == 100:
+            (line,) = [line for line in text.splitlines() if line.startswith(" |lateral touchdown| ")][:1]
+            assert line.split()[2:] == ["≤", "2", "m", "1", "of", "9", "–", "-0.500", "m"]
 
     @pytest.mark.parametrize("width", [100, 60, 44, 40])
     def test_nothing_is_cut_at_any_width(self, width: int) -> None:

@@ -15,6 +15,9 @@ import pytest
 from flown import good
 from reported import BATCHES, COMPARISONS, SCENARIO, comparison, ordinary, summary
 
+from landsim.batch.flights import flights_of
+from landsim.batch.summary import summarise
+from landsim.config import load_scenario
 from landsim.page.batch import batch_document
 from landsim.page.comparison import comparison_document
 from landsim.page.render import render
@@ -176,6 +179,36 @@ def test_what_it_says_is_made_from_the_numbers(page: str, batch: dict[str, Any])
     assert rows["landed in the box"] == [str(success["count"]), "60"]
     assert "pioneer" in section(root, "scenario").all("pre")[0].text
     assert {"landsim", "1.2.3"} <= set(read(section(root, "versions")).split())
+
+
+def test_the_verdict_says_what_the_summary_has(page: str, batch: dict[str, Any]) -> None:
+    one = section(tree(page), "verdict")
+    found = batch["verdict"]
+    assert [read(text) for text in one.all("p", "li")][: len(found["text"])] == [
+        read(Element("p", {}, text)) for text in found["text"]
+    ]
+    beyond, room, ended, levels = one.all("table")  # no go-around, and no monitor whose alarms could be counted
+    rows = {read(row.inside[0]): [read(cell) for cell in row.inside[1:]] for row in beyond.all("tr")[1:]}
+    assert rows["|lateral touchdown|"][:3] == ["at most 2 m", "1", "58"]
+    assert rows["sink rate"][-1] == "1·10⁻⁶"
+    assert len(rows) == 7  # of eight: both ends of the longitudinal touchdown have one name
+    rows = {read(row.inside[0]): [read(cell) for cell in row.inside[1:]] for row in room.all("tr")[1:]}
+    assert rows["|lateral touchdown|"] == ["at most 2 m", "–", "–", "–", "2.5 m", "−0.5 m"]
+    assert sum(int(read(row.inside[1])) for row in ended.all("tr")[1:]) == 60
+    assert [read(row.inside[0]) for row in levels.all("tr")[1:]] == ["lateral", "vertical"]
+
+
+def test_go_arounds_and_alarms_have_their_tables() -> None:
+    scenario = load_scenario("landing", overrides={"navigation.aiding": "lines", "fault.kind": "wrong"})
+    rows = [*BATCHES["gone around"], good(30, fault_at_s=8.0, fault_detected_after_s=0.5)]
+    found = summarise(scenario, flights_of(rows), {"scenario": "landing", "seed": 0, "versions": {}})
+    tables = section(tree(page_of(found)), "verdict").all("table")
+    captions = [read(table.all("caption")[0]) for table in tables]
+    assert "Why they went around" in captions[3]
+    (reason,) = tables[3].all("tr")[1:]
+    assert [read(cell) for cell in reason.inside[:3]] == ["no line has been believed for too long", "5", "31"]
+    assert captions[5].endswith("Alarms; found after 0.5 s (median), 0.5 s at most")
+    assert [read(row.inside[1]) for row in tables[5].all("tr")[1:]] == ["1", "1", "0"]
 
 
 def test_the_ten_worst_flights_each_have_the_command_that_flies_them_again(page: str, batch: dict[str, Any]) -> None:

@@ -255,6 +255,11 @@ def test_a_landing_outside_the_box_says_by_what(flight: dict[str, Array]) -> Non
     assert "stop_cross" not in head
 
 
+def test_a_go_around_says_why(flight: dict[str, Array]) -> None:
+    known = measured(flight) | {"outcome": "go_around", "in_box": False, "reason": "gone around: fog, -3.0 m up"}
+    assert "\ngone around: fog, −3.0 m up\n" in text_of(plots.navigation_errors(flight, SCENARIO, known))
+
+
 def test_the_end_of_all_lines_is_marked(flight: dict[str, Array]) -> None:
     log = dict(flight)
     for name in (f"{of}_seen_{end}" for of in ("left", "threshold", "right") for end in ("u0", "v0", "u1", "v1")):

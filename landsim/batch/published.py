@@ -105,6 +105,6 @@ TOUCHDOWN: dict[str, Asked] = {
     "along_max_m": Asked(1e-6, "beyond 900 m (3000 ft) past the threshold", _LANDING),
     "cross_max_m": Asked(1e-6, "outboard gear more than 21 m (70 ft) off the centreline of a runway of 45 m", _LANDING),
     "sink_max_mps": Asked(1e-6, "sink rate to the structural limit load", _LANDING),
-    "bank_max_deg": Asked(1e-8, "bank to the touch of a wing tip; AC 120-28D asks for 1e-7", _LANDING),
+    "bank_max_deg": Asked(1e-8, "bank to the touch of a wing tip, 1·10⁻⁷ by AC 120-28D", _LANDING),
 }
 """By the limits of a scenario's box that stand in their place, scaled to its runway and gear."""

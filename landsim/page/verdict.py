@@ -49,7 +49,10 @@ def _limits(found: Mapping[str, Any], percentage: str) -> list[Block]:
     room = tuple((_title(one), _limit(one), *_room(one)) for one in entries)
     criteria = [one["criterion"] for one in found["limits"] if one["criterion"]]
     standing = "; ".join(dict.fromkeys(f"{one['text']} (below {number(one['rate'])})" for one in criteria))
-    notes = (f"In place of the box the standards have: {standing}. {criteria[0]['source']}.",) if criteria else ()
+    notes = (
+        f"In place of the box the standards have: {standing}. {criteria[0]['source']}.",
+        "The approach is counted from 1000 m before the threshold, with what the start was off by.",
+    )
     return [
         Table(
             "How many flights were beyond each limit of the scenario's box, and beyond the tracking criteria in 95 % of"

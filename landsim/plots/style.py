@@ -90,7 +90,9 @@ def _how_it_ended(metrics: dict[str, Any]) -> str:
             if not limit["ok"]
         ]
         return f"{outcome}, outside the box: misses {', '.join(missed)}"
-    return re.sub(r"(?<![\w.])-(?=\d)", "−", f"{outcome}: {metrics['reason']}")
+    reason = metrics["reason"]
+    told = reason if outcome == "go_around" else f"{outcome}: {reason}"  # which says it
+    return re.sub(r"(?<![\w.])-(?=\d)", "−", told)
 
 
 def failure(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -> Failure | None:
