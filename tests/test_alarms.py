@@ -159,3 +159,11 @@ def test_the_log_has_what_guidance_was_given_held_to_the_next_frame(monkeypatch:
         np.testing.assert_array_equal(log[name], np.repeat(values, 4)[: log[name].size], err_msg=name)
     assert np.isnan(log["lateral_protection_m"][0])
     assert np.isfinite(log["lateral_protection_m"][-1])
+
+
+def test_guidance_that_is_given_the_truth_is_given_no_protection_level() -> None:
+    flight = fly(short(**{"simulation.guidance_state": "truth", "camera.outages_s": [[1.0, 2.0]]}), 2)
+    assert np.isnan(flight.log["lateral_protection_m"]).all()
+    assert not flight.log["alarm"].any()
+    assert set(flight.log["stage"]) == {0.0, 1.0}, "the stage stays that of the frames"
+    assert flight.metrics["integrity"]["lateral"]["frames"] == 0

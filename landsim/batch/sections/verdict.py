@@ -224,7 +224,8 @@ def _against(low: float, high: float, risk: float) -> str:
 
 def _faults(scenario: Scenario, flights: Flights) -> dict[str, Any]:
     """Wrong lines that were found, and alarms where there was nothing to find."""
-    monitored = scenario.navigation.aiding == "lines" or scenario.plug_ins.estimator != OWN
+    told = scenario.simulation.guidance_state != "truth"
+    monitored = told and (scenario.navigation.aiding == "lines" or scenario.plug_ins.estimator != OWN)
     at, after = flights.numbers("fault_at_s"), flights.numbers("fault_detected_after_s")
     faulty = np.isfinite(at) if scenario.fault.kind == "wrong" else np.zeros(flights.n, dtype=bool)
     flown = ~np.any([flights.are("outcome", outcome) for outcome in NEVER_FLOWN], axis=0)
@@ -315,7 +316,7 @@ def _protection_text(found: dict[str, Any]) -> list[str]:
 
 def _fault_text(found: dict[str, Any]) -> list[str]:
     if not found["monitored"]:
-        return ["Navigation by whole poses judges no line by itself: there is no alarm that could have been raised."]
+        return ["No line was judged by itself: there is no alarm that guidance could have been given."]
     text = []
     if found["detected"]["n"]:
         told = f"A wrong line in view was found within {found['within_s']:g} s"
