@@ -4,6 +4,7 @@ The protection level is that of a filter whose model holds: an error beyond it h
 risk, by its own covariance and the normal distribution.  Faults that the model does not have are the monitor's part.
 """
 
+import math
 from statistics import NormalDist
 
 from estimator.single_lines import LINES
@@ -32,7 +33,7 @@ class LineMonitor:
     def __init__(self, confirm: float, unaided: float) -> None:
         self._confirm = confirm
         self._unaided = unaided
-        self._time = 0.0
+        self._time = math.inf  # of the last frame; before the first no time has passed
         self._aided = 0.0
         self._against = [0.0] * LINES
         self._wrong = [False] * LINES

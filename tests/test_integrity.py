@@ -192,3 +192,13 @@ def test_a_wrong_line_in_flight_raises_the_alarm_within_a_second(line: int) -> N
     error = np.array(state.position) - truth_at(719).motion[:3]
     assert abs(error[1]) < 0.5
     assert abs(error[2]) < 0.5
+
+
+def test_a_first_frame_that_comes_late_counts_as_no_time() -> None:
+    """One frame in which a line is left out, nine seconds after the start, is no lasting disagreement."""
+    monitor = LineMonitor(0.3, 2.0)
+    monitor.take(9.0, 7, 5)
+    assert monitor.alarm(9.0) == Alarm.NONE
+    for frame in range(1, 11):
+        monitor.take(9.0 + frame / 30.0, 7, 5)
+    assert monitor.alarm(9.4) == Alarm.WRONG_LINE
