@@ -15,13 +15,20 @@ from estimator.compiled import compiled
 from estimator.fusion import NO_UPDATE, Gates, InertialVisionFilter, Update, taken_in
 from estimator.innovation import Eye, Innovation
 from estimator.mount import Mount
-from estimator.single_lines import AUGMENTED, CONSTANTS, lines_innovation
+from estimator.single_lines import AUGMENTED, CONSTANTS, LINES, lines_innovation
 from estimator.so3 import Array
-from estimator.strapdown import ACCEL_BIAS, AXES, STATES, ImuNoise, Site, predicted_with_constants
+from estimator.strapdown import ACCEL_BIAS, AXES, POSITION, STATES, ImuNoise, Site, predicted_with_constants
 
 SCALED = AUGMENTED + AXES
 """Numbers of a filter that estimates scale factors."""
 _BIASES = slice(STATES - AXES, STATES)
+FAR = 1.0
+"""Standard deviation across or in height, m, beyond which lines are linearised again where they lead to: after a long
+time without any they may lie so far off that the first linearisation makes a filter sure of a wrong place."""
+ITERATIONS = 8
+SETTLED = 0.01
+"""Change of the position, m, at which that is over."""
+_OPEN = np.full(LINES, np.inf)
 
 
 def with_constants(start: Start, calibration: Array, noise: ImuNoise, gravity: float) -> Start:
@@ -151,6 +158,28 @@ class LineVisionFilter(InertialVisionFilter):
         result: Array = self._ekf.P
         return result
 
+    def _innovation(
+        self, lines: Array, extent: Array, tilt: float, gates: Array, point: Array
+    ) -> tuple[Array, Array, Array, int, int, float]:
+        """As `lines_innovation`, of this filter's state."""
+        P = self._ekf.P
+        return lines_innovation(self._eye, lines, extent, self.nominal, self.calibration, tilt, P, gates, point)
+
+    def _most_likely(self, lines: Array, extent: Array, tilt: float) -> Array | None:
+        """Errors (n,) of the predicted state that agree best with it and with all lines, by Gauss and Newton.
+
+        None where the iteration does not settle: the lines then say nothing that a covariance could hold.
+        """
+        point: Array = self._zero
+        P = self._ekf.P
+        for _ in range(ITERATIONS):
+            y, H, R, *_ = self._innovation(lines, extent, tilt, _OPEN, point)
+            PH = P @ H.T
+            before, point = point, PH @ np.linalg.solve(H @ PH + R, y)
+            if np.abs(point[POSITION] - before[POSITION]).max() < SETTLED:
+                return point
+        return None
+
     def observe_lines(self, lines: Array, extent: Array, tilt: float) -> LinesUpdate:
         """Correct the state by those of a frame's lines that agree with it.  `predict` comes first.
 
@@ -164,9 +193,15 @@ class LineVisionFilter(InertialVisionFilter):
             Mount angle as read, rad.
         """
         ekf = self._ekf
-        y, H, R, found, believed, nis = lines_innovation(
-            self._eye, lines, extent, self.nominal, self.calibration, tilt, ekf.P, self._line_gates
-        )
+        y, H, R, found, believed, nis = self._innovation(lines, extent, tilt, self._line_gates, self._zero)
+        if found and max(ekf.P[1, 1], ekf.P[2, 2]) > FAR**2:
+            point = self._most_likely(lines, extent, tilt)
+            if point is None:
+                believed = 0
+            else:
+                again = self._innovation(lines, extent, tilt, self._line_gates, point)
+                if again[4].bit_count() >= believed.bit_count():
+                    y, H, R, found, believed, nis = again
         if believed == 0:
             return LinesUpdate(Update(2 * found.bit_count(), nis, False) if found else NO_UPDATE, found, 0)
         self._correct(Innovation(y, H, R))

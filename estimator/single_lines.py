@@ -32,7 +32,7 @@ from estimator.compiled import compiled, exp, rotate
 from estimator.covariance import LEFT, RIGHT, THRESHOLD
 from estimator.mount import camera_axes, camera_position
 from estimator.so3 import Array, Vec3
-from estimator.strapdown import STATES, unpacked
+from estimator.strapdown import STATES, corrected, unpacked
 
 LINES = 3
 NUMBERS = 2 * LINES
@@ -264,8 +264,13 @@ def lines_innovation(
     tilt: float,
     covariance: Array,
     gates: Array,
+    point: Array,
 ) -> tuple[Array, Array, Array, int, int, float]:
-    """The measurement that the believed lines of a frame make.
+    """The measurement that the believed lines of a frame make of the errors of a predicted state.
+
+    The residuals d and their matrix H are those at the predicted state moved by `point`; y = d + H point is the
+    measurement of the errors of the predicted state itself, as an iterated filter has it (Jazwinski, Stochastic
+    Processes and Filtering Theory, section 8.3).
 
     Parameters
     ----------
@@ -275,6 +280,8 @@ def lines_innovation(
         Of the predicted errors; on what follows the calibration no line depends.
     gates : (3,) array
         As for `believed_lines`.
+    point : (23 or more,) array
+        Errors of the predicted state at which the lines are linearised; zero for the predicted state itself.
 
     Returns
     -------
@@ -284,7 +291,14 @@ def lines_innovation(
     nis : float
         As `believed_lines` gives them.
     """
-    d, H = line_residuals(eye, lines, extent, nominal, calibration, tilt)
+    if np.any(point):
+        moved = corrected(nominal, point)
+        d, H = line_residuals(eye, lines, extent, moved, calibration + point[STATES:AUGMENTED], tilt)
+        for i in range(6):
+            for j in range(AUGMENTED):
+                d[i] += H[i, j] * point[j]
+    else:
+        d, H = line_residuals(eye, lines, extent, nominal, calibration, tilt)
     size = covariance.shape[0]
     HP = np.zeros((6, size))
     R, S = np.zeros((6, 6)), np.zeros((6, 6))

@@ -4,6 +4,7 @@
 consistency           normalised errors of 9 states, of 15 and of all 23 over draws, calibration drawn with the rest
 one edge              an edge alone keeps the lateral error from growing, as dead reckoning does not
 wrong line            is left out, while the others count
+seen late             from far beside: the covariance says how far off it is
 numbers               the covariance stays symmetric and positive over a whole flight
 ====================  ============================================================================================
 """
@@ -19,11 +20,13 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 from test_fusion import drawn_start, error_of
 
+from estimator import line_fusion
 from estimator.alignment import Start
 from estimator.camera import PinholeCamera
 from estimator.line_fusion import LineVisionFilter
 from estimator.single_lines import CONSTANTS, Calibration, gates_of
-from estimator.so3 import Array
+from estimator.so3 import Array, flat
+from estimator.strapdown import Inertial
 
 SIGMA = np.array(
     Calibration(
@@ -163,3 +166,43 @@ def test_a_wrong_line_is_left_out_and_the_others_count() -> None:
     assert set(records[199:299, 3]) == {3.0}  # the first record is that of frame 1
     assert (records[299:320, 3].astype(int) & 4).all()
     assert records[299, 0] < chi2.isf(1e-6, 9)
+
+
+@pytest.mark.parametrize("across", [-24.0, 24.0])
+@pytest.mark.parametrize("frame", [300, 450])
+def test_lines_seen_late_from_far_beside_do_not_make_it_sure_of_a_wrong_place(frame: int, across: float) -> None:
+    """390 m and 185 m before the threshold, a state 24 m to the side of where it is, as it knows that it may be.
+
+    The truth is within some sigma of what the filter then says; linearised once, at the predicted state, it is not.
+    """
+    start, lines, tilt, true = seen_from(frame, across)
+    errors = []
+    for far in (line_fusion.FAR, np.inf):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(line_fusion, "FAR", far)
+            running = filter_of(start, np.zeros(CONSTANTS))
+            believed = running.observe_lines(lines, np.zeros(3), tilt).believed
+        off = true - np.array(running.state.position)
+        errors.append((believed, float(off @ np.linalg.solve(running.covariance[:3, :3], off))))
+    assert errors[0][0] == 7
+    assert errors[0][1] < chi2.ppf(0.9999, 3)
+    assert errors[1][1] > 10.0 * errors[0][1] or errors[1][0] == 0
+
+
+def test_lines_that_lead_nowhere_are_not_believed() -> None:
+    """18 m before the threshold and 24 m to the side the iteration does not settle: the state stays as it was."""
+    start, lines, tilt, _ = seen_from(572, 24.0)
+    running = filter_of(start, np.zeros(CONSTANTS))
+    update = running.observe_lines(lines, np.zeros(3), tilt)
+    assert (update.found, update.believed) == (7, 0)
+    assert running.state.position == start.state.position
+
+
+def seen_from(frame: int, across: float) -> tuple[Start, Array, float, Array]:
+    """A start that is off by so many metres to the right, and may be; the frame's lines and tilt; the true position."""
+    t, k = flight.truth(), frame * flight.EVERY
+    (x, y, z), (vx, vy, vz) = t.position[k].tolist(), t.velocity[k].tolist()
+    nominal = Inertial((x, y + across, z), (vx, vy, vz), flat(t.R[k]))
+    sigma = np.array((4.0, 10.0, 2.0, 0.5, 0.5, 0.5, 2e-3, 2e-3, 8e-3, *[1e-5] * 3, *[1e-2] * 3))
+    lines = drawn(6, np.zeros(CONSTANTS)).lines[frame]
+    return Start(nominal, np.diag(sigma**2)), lines, float(t.tilt[k]), t.position[k]

@@ -140,6 +140,7 @@ def test_all_lines_tell_what_the_pose_tells() -> None:
         EARLY[1].tilt,
         np.diag(np.append(np.full(15, 1.0), np.zeros(CONSTANTS))),
         np.full(3, np.inf),
+        np.zeros(AUGMENTED),
     )
     assert (found, believed, H.shape) == (7, 7, (6, AUGMENTED))
     weighed, of_pose = np.linalg.solve(R, H[:, :15]), np.linalg.solve(pose.R, pose.H)
