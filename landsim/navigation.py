@@ -187,7 +187,7 @@ class Navigator:
         self._noise_dt, self._noise = NAN, np.empty(0)
         self._known: Known | None = None
         self._monitor: LineMonitor | None = None
-        self._protection = protection_factor(config.integrity_risk)
+        self._protection = config.protection_inflation * protection_factor(config.integrity_risk)
         if config.aiding == "lines":
             self._calibration = calibration_sigma(config)
             self._line_gates = gates_of(config.line_gate_probability)

@@ -135,6 +135,9 @@ def test_protection_levels_are_sigmas_times_the_factor() -> None:
     sigma = np.sqrt(np.diag(navigator.covariance))
     assert state.lateral_protection == pytest.approx(3.2905 * sigma[1], rel=1e-4)
     assert state.vertical_protection == pytest.approx(3.2905 * sigma[2], rel=1e-4)
+    inflated = navigator_of(aiding="lines", integrity_risk=1e-3, protection_inflation=1.5)
+    flown(inflated, frames(), 200)
+    assert inflated.state(0.0).lateral_protection == pytest.approx(1.5 * state.lateral_protection)
 
 
 def monitor_after(*frames_of: tuple[int, int, int]) -> tuple[LineMonitor, float]:

@@ -166,6 +166,8 @@ class NavigationConfig(Section):
     """So long without a believed line raises an alarm."""
     integrity_risk: Annotated[float, Field(gt=0.0, lt=0.5)] = 1e-4
     """With which the error may pass the protection level, at any one time."""
+    protection_inflation: Annotated[float, Field(ge=1.0, le=10.0)] = 1.0
+    """By which the filter's own σ is taken larger for the protection level: room for what its model does not have."""
     tilt_sigma_deg: NotNegative = 0.0
     """1 σ, as the filter believes, of the camera's calibration, which it estimates with ``aiding = "lines"``: of the
     optical axis against the mount's angle,"""
