@@ -41,9 +41,10 @@ A module imports from those below it only; a contract in the checks holds this.
 ``onboard``                          what navigation and guidance are told of a scenario
 ``modes``                            the aircraft's modes, from JSBSim's own linearisation
 ``dispersion``                       what a scenario's dispersions draw for each flight
-``plant``                            JSBSim, and the only one that imports it; feet, slugs and degrees end here
-``sensors``                          truth to measurements: camera lines, one IMU, pitot
-``navigation``                       drives the estimator and its filter
+``plant``, ``atmosphere``            JSBSim, the only one that imports it: feet, slugs and degrees end here; the wind
+``sensors``, ``camera_errors``       truth to measurements: camera lines, one IMU, pitot; a camera as it is bought
+``navigation``, ``integrity``        drives the estimator and its filter; what it says of its own integrity
+``handover``                         the state that a GNSS/INS approach hands over
 ``guidance``                         phases and commands, from the navigation state alone
 ``go_around``, ``wind_law``          when a landing is given up; what is flown besides in wind
 ``omniscient``                       the true state in place of navigation's, for comparison

@@ -25,6 +25,7 @@ from landsim.schema import (
     BoundsConfig,
     BoxConfig,
     CameraConfig,
+    ClimbGains,
     CorrelationConfig,
     DispersionsConfig,
     DrawConfig,
@@ -66,6 +67,7 @@ __all__ = [
     "BoundsConfig",
     "BoxConfig",
     "CameraConfig",
+    "ClimbGains",
     "CorrelationConfig",
     "DispersionsConfig",
     "DrawConfig",
@@ -149,6 +151,9 @@ def load_scenario(name_or_path: str | Path, overrides: Mapping[str, object] | No
     if settings.approach.law == "wind" and aircraft.guidance.wind is None:
         where = _where("approach.law", path, overrides)
         raise ScenarioError(f'{where}: must be "calm": {aircraft.name} has no [guidance.wind] in {AIRCRAFT_FILE}')
+    if settings.go_around.enabled and aircraft.guidance.climb is None:
+        where = _where("go_around.enabled", path, overrides)
+        raise ScenarioError(f"{where}: must be false: {aircraft.name} has no [guidance.climb] in {AIRCRAFT_FILE}")
     return Scenario(
         **{**sections, "aircraft": AircraftChoice(name=name)},
         name=path.stem,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from estimator.so3 import Vec3, rotate
-from landsim.config import AircraftConfig, ApproachConfig, GoAroundConfig
+from landsim.config import AircraftConfig, ApproachConfig, ClimbGains, GoAroundConfig
 from landsim.go_around import NO_DOUBT, Doubt, doubt_of, doubted, gives_up
 from landsim.state import Command, NavState, Phase
 from landsim.units import DEG
@@ -79,6 +79,8 @@ class Law:
     """When the landing is given up; None where it never is."""
     wind: WindLaw | None = None
     """What is flown besides in wind."""
+    climb: ClimbGains | None = None
+    """How the go-around climbs, as in the aircraft's file; not None where there may be one."""
 
 
 def law_of(
@@ -94,6 +96,8 @@ def law_of(
     a, f, r, wind = gains.approach, gains.flare, gains.rollout, gains.wind if approach.law == "wind" else None
     if approach.law == "wind" and wind is None:
         raise ValueError(f"{aircraft.name} has no [guidance.wind]")
+    if go_around is not None and go_around.enabled and gains.climb is None:
+        raise ValueError(f"{aircraft.name} has no [guidance.climb]")
     return Law(
         dt=dt,
         gravity=gravity,
@@ -133,6 +137,7 @@ def law_of(
         tilt_rollout=aircraft.mount.tilt_rollout_deg * DEG,
         half_view=half_view,
         go_around=go_around if go_around is not None and go_around.enabled else None,
+        climb=gains.climb,
         wind=None if wind is None else wind_law_of(wind),
     )
 
@@ -200,8 +205,8 @@ def guide(law: Law, nav: NavState, state: GuidanceState) -> tuple[Command, Guida
     phase = next_phase(law, nav, state.phase)
     if law.go_around is not None and (phase is _APPROACH or phase is _FLARE):
         phase, state = _reconsidered(law, law.go_around, nav, phase, state)
-    if phase is _GO_AROUND:
-        return _climb(law, nav, state)
+    if phase is _GO_AROUND and law.climb is not None:
+        return _climb(law, law.climb, nav, state)
     if phase is _ACQUIRE:
         return _HANDS_OFF._replace(airspeed=law.approach_speed, tilt=law.tilt_early), state
     if phase is _ROLLOUT or phase is _STOPPED:
@@ -294,30 +299,18 @@ def _reconsidered(
     return _GO_AROUND if gives_up(limits, doubt) else phase, state._replace(doubt=doubt)
 
 
-CLIMB_ANGLE = 3.0 * DEG
-"""Climb that is asked for at the approach speed,"""
-CLIMB_PER_SPEED = 1.5 * DEG
-"""more or less by so much per m/s of airspeed above or below it,"""
-CLIMB_MAX = 6.0 * DEG
-"""and at most; at least none."""
-CLIMB_BANK = 5.0 * DEG
-"""Most bank in the climb: it keeps the track along the runway, not the place beside it."""
-FULL_THROTTLE = 15.0
-"""Above the approach speed, m/s: so fast the throttle is told to become, which opens it fully."""
-
-
-def _climb(law: Law, nav: NavState, state: GuidanceState) -> tuple[Command, GuidanceState]:
+def _climb(law: Law, gains: ClimbGains, nav: NavState, state: GuidanceState) -> tuple[Command, GuidanceState]:
     """Full throttle, wings near level, along the runway; airspeed is held by the climb."""
     excess = nav.airspeed - law.approach_speed
-    climb = _within(0.0, CLIMB_ANGLE + CLIMB_PER_SPEED * excess, CLIMB_MAX)
+    climb = _within(0.0, gains.angle_deg + gains.angle_deg_per_mps * excess, gains.angle_max_deg) * DEG
     alpha = law.trim_alpha + law.trim_alpha_slope * max(excess, -0.5 * law.approach_speed)
     pitch = _within(law.pitch_min, alpha + climb, law.pitch_max)
     bank = math.atan(-law.bank_gain * nav.velocity[1] / law.gravity)
     command = Command(
         engaged=True,
         pitch=pitch,
-        roll=_within(-CLIMB_BANK, bank, CLIMB_BANK),
-        airspeed=law.approach_speed + FULL_THROTTLE,
+        roll=_within(-gains.bank_max_deg * DEG, bank, gains.bank_max_deg * DEG),
+        airspeed=law.approach_speed + gains.airspeed_added_mps,
         idle=False,
         ground=False,
         steering=0.0,

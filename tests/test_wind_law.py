@@ -137,8 +137,10 @@ def test_an_aircraft_without_the_gains_is_refused(tmp_path: Any) -> None:
     for part in ("Engines", "Systems", "pioneer.xml"):
         (bare / part).symlink_to(folder / part)
     text = (folder / "aircraft.toml").read_text()
-    first, last = text.index("[guidance.wind]"), text.index("[guidance.rollout]")
+    first, last = text.index("[guidance.wind]"), text.index("[guidance.rollout]")  # the climb's gains stand between
     (bare / "aircraft.toml").write_text(text[:first] + text[last:])
     load_scenario("landing", overrides={"aircraft.name": str(bare)})
     with pytest.raises(InputError, match=r"approach\.law: must be \"calm\""):
         load_scenario("landing", overrides={"aircraft.name": str(bare), "approach.law": "wind"})
+    with pytest.raises(InputError, match=r"go_around\.enabled: must be false"):
+        load_scenario("landing", overrides={"aircraft.name": str(bare), "go_around.enabled": True})

@@ -143,6 +143,21 @@ class WindGains(Section):
     """and most of it."""
 
 
+class ClimbGains(Section):
+    """``[guidance.climb]``: the go-around, at full throttle, for scenarios that have one."""
+
+    angle_deg: Positive
+    """Climb asked for at the approach speed,"""
+    angle_deg_per_mps: NotNegative
+    """more or less by so much per m/s of airspeed above or below it,"""
+    angle_max_deg: Positive
+    """and at most; at least none."""
+    bank_max_deg: Annotated[float, Field(gt=0.0, le=60.0)]
+    """It keeps the track along the runway, not the place beside it."""
+    airspeed_added_mps: Positive
+    """Above the approach speed: so fast the throttle is told to become, which opens it fully."""
+
+
 class GuidanceConfig(Section):
     """``[guidance]``: gains by phase."""
 
@@ -150,6 +165,7 @@ class GuidanceConfig(Section):
     flare: FlareGains
     rollout: RolloutGains
     wind: WindGains | None = None
+    climb: ClimbGains | None = None
 
 
 class AircraftFile(Section):
