@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import count
 from typing import Literal, TypeAlias
 
 from landsim.charts.model import Chart
@@ -35,6 +36,10 @@ class Table:
     rows: tuple[tuple[str | Cell, ...], ...]
     words: frozenset[int] = frozenset()
     """Columns that hold words, and are set flush left like the first; others hold numbers."""
+
+    def is_number(self, column: int) -> bool:
+        """Whether a column holds numbers, and is set flush right."""
+        return column > 0 and column not in self.words
 
 
 @dataclass(frozen=True)
@@ -87,6 +92,29 @@ class Document:
     subtitle: str
     facts: tuple[Fact, ...]
     sections: tuple[Section, ...]
+
+    @property
+    def head(self) -> str:
+        """What it is, above or below its title."""
+        return f"landsim {self.kind} report"
+
+    def foot(self, version: str) -> str:
+        """What made it, and where its numbers are."""
+        numbers = "summary.json" if self.kind == "batch" else "compare.json"
+        return f"Made by landsim {version}. The numbers behind every figure are in {numbers}, in the same folder."
+
+    def labelled(self) -> tuple[tuple[Section, tuple[tuple[Block, str], ...]], ...]:
+        """The sections with their blocks, each with its label: tables and figures are counted through the page."""
+        tables, figures = count(1), count(1)
+
+        def label(block: Block) -> str:
+            if isinstance(block, Table):
+                return f"Table {next(tables)}. {block.caption}"
+            if isinstance(block, Figure):
+                return f"Figure {next(figures)}. {block.chart.title}."
+            return block.label if isinstance(block, Code) else ""
+
+        return tuple((one, tuple((block, label(block)) for block in one.blocks)) for one in self.sections)
 
 
 def figures_of(charts: tuple[Chart, ...], otherwise: str) -> tuple[Block, ...]:
