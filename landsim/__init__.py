@@ -30,7 +30,7 @@ A module imports from those below it only; a contract in the checks holds this.
 ===================================  ==================================================================================
 ``cli``, ``terminal``                parse arguments and print; ``tables`` are those at the end of what was done
 ``report``, ``plots``                pictures; the only ones that import matplotlib
-``page``                             the report as one HTML file
+``page``                             the report as one HTML file and as Markdown
 ``charts``                           what the figures of a batch show, as data, from its summary alone
 ``runs``                             run folders, written whole or not at all
 ``budget``                           the line precision that bounds ask for, and the ranges from which they hold

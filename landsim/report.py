@@ -12,11 +12,14 @@ if TYPE_CHECKING:
 
     from landsim.charts.model import Chart
     from landsim.config import Scenario
+    from landsim.page.document import Document
     from landsim.study.model import Envelope
 
 DPI = 150
 PICTURES = ("profile.png", "navigation.png", "controls.png", "camera.png", "consistency.png")
 """What ``draw_run`` writes, in this order."""
+REPORT, COMPARISON = ("report.html", "report.md"), ("compare.html", "compare.md")
+"""The page, and the same as Markdown, of a batch and of a comparison."""
 
 
 def draw_run(folder: Path, scenario: "Scenario", log: Log, metrics: dict[str, Any]) -> list[Path]:
@@ -99,7 +102,7 @@ def draw_study(
 
 
 def write_report(folder: Path, scenario: "Scenario", summary: Mapping[str, Any], *, plots: bool = True) -> list[Path]:
-    """Write the report of a batch: ``report.html``, and each of its figures as PNG and as PDF.
+    """Write the report of a batch: ``report.html``, ``report.md``, and each of its figures as PNG and as PDF.
 
     Parameters
     ----------
@@ -110,31 +113,28 @@ def write_report(folder: Path, scenario: "Scenario", summary: Mapping[str, Any],
     summary : mapping
         Of ``landsim.batch.summary.summarise``, or as summary.json has it.
     plots : bool
-        Whether to draw the figures as files too.
+        Whether to draw the figures as files too; the Markdown shows none without.
 
     Returns
     -------
     list of Path
-        The page first.
+        The page first, then the Markdown.
 
     Raises
     ------
     OSError
         If a file cannot be written; what stood there before then stands there still.
     """
-    from landsim import __version__
     from landsim.charts.batch import batch_charts
     from landsim.config import resolved_toml
     from landsim.page.batch import batch_document
-    from landsim.page.render import render
 
     document = batch_document(summary, resolved_toml(scenario), _named(folder))
-    page = _write(folder / "report.html", render(document, __version__))
-    return [page, *(_draw_charts(folder, batch_charts(summary).values()) if plots else [])]
+    return _write_document(folder, REPORT, document, batch_charts(summary).values() if plots else None)
 
 
 def write_comparison(folder: Path, compared: Mapping[str, Any], *, plots: bool = True) -> list[Path]:
-    """Write the report of a comparison: ``compare.html``, and each of its figures as PNG and as PDF.
+    """Write the report of a comparison: ``compare.html``, ``compare.md``, and each of its figures as PNG and as PDF.
 
     Parameters
     ----------
@@ -143,25 +143,37 @@ def write_comparison(folder: Path, compared: Mapping[str, Any], *, plots: bool =
     compared : mapping
         Of ``landsim.batch.compare.compare``, or as compare.json has it.
     plots : bool
-        Whether to draw the figures as files too.
+        Whether to draw the figures as files too; the Markdown shows none without.
 
     Returns
     -------
     list of Path
-        The page first.
+        The page first, then the Markdown.
 
     Raises
     ------
     OSError
         As `write_report` does.
     """
-    from landsim import __version__
     from landsim.charts.comparison import comparison_charts
     from landsim.page.comparison import comparison_document
+
+    charts = comparison_charts(compared).values() if plots else None
+    return _write_document(folder, COMPARISON, comparison_document(compared), charts)
+
+
+def _write_document(
+    folder: Path, names: tuple[str, str], document: "Document", sections: "Iterable[Sequence[Chart]] | None"
+) -> list[Path]:
+    """The page, the same as Markdown, and the figures that are to be drawn; the Markdown last, as it shows them."""
+    from landsim import __version__
+    from landsim.page.markdown import markdown_of
     from landsim.page.render import render
 
-    page = _write(folder / "compare.html", render(comparison_document(compared), __version__))
-    return [page, *(_draw_charts(folder, comparison_charts(compared).values()) if plots else [])]
+    page = _write(folder / names[0], render(document, __version__))
+    figures = [] if sections is None else _draw_charts(folder, sections)
+    text = _write(folder / names[1], markdown_of(document, __version__, pictures=sections is not None))
+    return [page, text, *figures]
 
 
 def _draw_charts(folder: Path, sections: "Iterable[Sequence[Chart]]") -> list[Path]:

@@ -118,7 +118,7 @@ class TestBatch:
         copied(flown, tmp_path / "copy")
         code, out, _ = landsim("plot", "copy")
         assert code == 0
-        assert "  copy/report.html\n" in out
+        assert "  copy/report.html\n  copy/report.md\n" in out
         assert (tmp_path / "copy" / "summary.json").is_file()
 
     def test_two_batches_are_compared(self, landsim: Run, flown: Path, tmp_path: Path) -> None:
@@ -135,21 +135,23 @@ class TestBatch:
         """A report of six flights and what a killed process was drawing, but nothing of somebody else's."""
         copy = copied(flown, tmp_path / "b", "summary.json")
         mine = {"notes.png", ".notes.png.part", "x.pdf"}
-        for name in ("report.html", "rates.png", "rates.pdf", ".report.html.part", ".rates.pdf.part", *mine):
+        drawing = (".report.html.part", ".report.md.part", ".rates.pdf.part")
+        for name in ("report.html", "report.md", "rates.png", "rates.pdf", *drawing, *mine):
             (copy / name).write_text("")
         (copy / "rates").mkdir()
         code, _, err = landsim(
             "batch", "landing", *SETTINGS, "-n", "7", "--resume", "--no-report", "--workers", "1", "--out", "b"
         )
-        told = "removed report.html and 2 figures, of 6 flights: the batch goes on to 7; landsim plot draws them again"
-        assert (code, err.splitlines()[0]) == (0, f"landsim: b: {told}")
+        told = "removed report.html, report.md and 2 figures, of 6 flights: the batch goes on to 7"
+        assert (code, err.splitlines()[0]) == (0, f"landsim: b: {told}; landsim plot draws them again")
         assert err.splitlines()[-1].startswith("landsim: 1 flight in ")
         own = {".lock", "batch.json", "flights.parquet", "scenario.toml", "summary.json"}
         assert {path.name for path in copy.iterdir()} == own | mine | {"rates"}
         assert json.loads((copy / "summary.json").read_text())["batch"]["n"] == 7
-        (copy / "report.html").write_text("")
+        for name in ("report.html", "report.md"):
+            (copy / name).write_text("")
         code, _, err = landsim("batch", "landing", *SETTINGS, "--resume", "--no-report", "--out", "b")
-        assert (code, err, (copy / "report.html").exists()) == (0, "", True)
+        assert (code, err, (copy / "report.html").exists(), (copy / "report.md").exists()) == (0, "", True, True)
 
     def test_tables_that_were_written_over_are_refused(self, landsim: Run, flown: Path, tmp_path: Path) -> None:
         copy = copied(flown, tmp_path / "b")

@@ -55,7 +55,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An ordinary report and comparison, and reports of one flight and of none that came down."""
     folder = tmp_path_factory.mktemp("pages")
     for name, batch in (("one.html", "one flight"), ("none.html", "no touchdown"), ("report.html", "ordinary")):
-        (path,) = write_report(folder, SCENARIO, summary(BATCHES[batch]), plots=False)
+        path, _ = write_report(folder, SCENARIO, summary(BATCHES[batch]), plots=False)
         path.replace(folder / name)
     write_comparison(folder, comparison(**COMPARISONS["ordinary"]), plots=False)
     return folder

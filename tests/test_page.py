@@ -4,90 +4,25 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from html.parser import HTMLParser
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
 from flown import good
+from pages import Element, page_of, read, section, tree
 from reported import BATCHES, COMPARISONS, SCENARIO, comparison, ordinary, summary
 
 from landsim.batch.flights import flights_of
 from landsim.batch.summary import summarise
 from landsim.config import load_scenario
-from landsim.page.batch import batch_document
-from landsim.page.comparison import comparison_document
-from landsim.page.render import render
 from landsim.report import write_comparison, write_report
 
-TOML = 'kind = "flight"\n\n[aircraft]\nname = "pioneer"\n'
 BATCH = [
     "summary", "verdict", "outcomes", "touchdown", "distributions", "tracking", "navigation", "consistency",
     "sensitivity", "worst", "scenario", "versions",
 ]  # fmt: skip
 COMPARISON = ["summary", "outcomes", "settings", "differences", "distributions", "navigation"]
-VOID = {"meta", "link", "line", "rect", "circle", "path", "br"}
-
-
-@dataclass
-class Element:
-    """An element of the page, with all its text."""
-
-    tag: str
-    attributes: dict[str, str]
-    text: str = ""
-    inside: list["Element"] = field(default_factory=list)
-
-    def all(self, *tags: str) -> list["Element"]:
-        return [one for child in self.inside for one in ([child] if child.tag in tags else []) + child.all(*tags)]
-
-
-class Tree(HTMLParser):
-    """The page as a browser takes it; an element that is closed by another one is an error."""
-
-    def __init__(self, page: str) -> None:
-        super().__init__(convert_charrefs=True)
-        self.open = [Element("", {})]
-        self.feed(page)
-        self.close()
-        assert [one.tag for one in self.open] == [""]
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        element = Element(tag, {name: value or "" for name, value in attrs})
-        self.open[-1].inside.append(element)
-        if tag not in VOID:
-            self.open.append(element)
-
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.open[-1].inside.append(Element(tag, {name: value or "" for name, value in attrs}))
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop().tag == tag
-
-    def handle_data(self, data: str) -> None:
-        for element in self.open:
-            element.text += data
-
-
-def page_of(found: Mapping[str, Any], folder: str = "runs/001-landing") -> str:
-    document = comparison_document(found) if "pairs" in found else batch_document(found, TOML, folder)
-    return render(document, "1.2.3")
-
-
-def tree(page: str) -> Element:
-    return Tree(page).open[0]
-
-
-def read(one: Element) -> str:
-    return " ".join(one.text.replace("\u00a0", " ").split())
-
-
-def section(root: Element, name: str) -> Element:
-    (found,) = [one for one in root.all("section") if one.attributes["id"] == name]
-    return found
 
 
 @pytest.fixture(scope="module")
@@ -270,9 +205,9 @@ def test_names_are_text_and_nothing_else(name: str) -> None:
 
 def test_a_report_is_written_whole_beside_its_pictures(tmp_path: Path) -> None:
     paths = write_report(tmp_path, SCENARIO, summary([good(i, x_m=270.0 + i) for i in range(5)]))
-    assert paths[0] == tmp_path / "report.html"
+    assert paths[:2] == [tmp_path / "report.html", tmp_path / "report.md"]
     assert {path.name for path in tmp_path.iterdir()} == {path.name for path in paths}
-    names = {path.stem for path in paths[1:]}
+    names = {path.stem for path in paths[2:]}
     assert {"rates", "touchdown", "distributions", "errors-position", "consistency"} <= names
     for name in names:
         assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
@@ -280,16 +215,16 @@ def test_a_report_is_written_whole_beside_its_pictures(tmp_path: Path) -> None:
     text = paths[0].read_text(encoding="utf-8")
     assert text.startswith("<!DOCTYPE html>")
     assert 'name = "pioneer"' in tree(text).all("pre")[0].text
-    assert write_report(tmp_path, SCENARIO, summary([good(0)]), plots=False) == [tmp_path / "report.html"]
+    assert write_report(tmp_path, SCENARIO, summary([good(0)]), plots=False) == paths[:2]
 
 
 def test_the_same_summary_makes_the_same_page(tmp_path: Path) -> None:
     written = []
     for _ in range(2):
-        (path,) = write_comparison(tmp_path, comparison(**COMPARISONS["ordinary"]), plots=False)
-        written.append(path.read_bytes())
+        paths = write_comparison(tmp_path, comparison(**COMPARISONS["ordinary"]), plots=False)
+        written.append([path.read_bytes() for path in paths])
     assert written[0] == written[1]
-    assert path.name == "compare.html"
+    assert [path.name for path in paths] == ["compare.html", "compare.md"]
 
 
 def test_what_cannot_be_written_leaves_nothing_behind(tmp_path: Path) -> None:
@@ -301,9 +236,18 @@ def test_what_cannot_be_written_leaves_nothing_behind(tmp_path: Path) -> None:
     assert (tmp_path / "report.html" / "mine").exists()
 
 
+def test_markdown_that_cannot_be_written_leaves_what_was_there(tmp_path: Path) -> None:
+    (tmp_path / "report.md").mkdir()
+    (tmp_path / "report.md" / "mine").touch()
+    with pytest.raises(IsADirectoryError):
+        write_report(tmp_path, SCENARIO, summary([good(0)]), plots=False)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "report.md"]
+    assert (tmp_path / "report.md" / "mine").exists()
+
+
 def test_nothing_heavy_is_loaded_before_it_is_needed() -> None:
     code = (
-        "import sys, landsim.report, landsim.page.render, landsim.charts.batch;"
+        "import sys, landsim.report, landsim.page.render, landsim.page.markdown, landsim.charts.batch;"
         "print(sorted({'plotly', 'matplotlib', 'jinja2', 'pandas', 'scipy'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

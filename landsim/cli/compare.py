@@ -25,7 +25,8 @@ def compare(folders: tuple[Path, ...], out: Path | None, no_report: bool) -> Non
     """Tell how the batches in two DIRs or more differ: each other with the first, over the seeds that both flew.
 
     A difference is the other less the first: above zero where the other has more.  Tables are printed; the numbers
-    (compare.json), the page (compare.html) and the figures go to a new folder, --out, and none to the batches' own.
+    (compare.json), the page (compare.html, compare.md) and the figures go to a new folder, --out, and none to the
+    batches' own.
     """
     from landsim.batch.compare import Batch
     from landsim.batch.compare import compare as compared_of

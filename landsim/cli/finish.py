@@ -122,27 +122,30 @@ def clear_report(folder: Path, asked: int) -> None:
 
     from landsim.batch.folder import SUMMARY_FILE
     from landsim.batch.identity import flights
+    from landsim.batch.sections.words import several
     from landsim.errors import RunFolderError
+    from landsim.report import REPORT
+    from landsim.study.words import listed
 
     try:
         summary = json.loads((folder / SUMMARY_FILE).read_text(encoding="utf-8"))
         described = summary["batch"]["n"]
     except (OSError, ValueError, KeyError, TypeError):
         summary, described = {}, None  # as where nothing has been summed up yet
-    pages = ["report.html", *_figures_of(summary)]
+    figures = _figures_of(summary)
     try:
-        for name in pages:
+        for name in (*REPORT, *figures):
             (folder / f".{name}.part").unlink(missing_ok=True)
         if described is None or described >= asked:
             return
-        there = [path for path in (folder / name for name in pages) if path.is_file()]
-        for path in [*there, folder / SUMMARY_FILE]:  # last what names the others, so that a killed one can go on
-            path.unlink()
+        pages, drawn = ([name for name in names if (folder / name).is_file()] for names in (REPORT, figures))
+        for name in (*pages, *drawn, SUMMARY_FILE):  # last what names the others, so that a killed one can go on
+            (folder / name).unlink()
     except OSError as error:
         raise RunFolderError(f"{folder}: cannot be written: {error.strerror}") from None
-    if there:
-        more = f" and {len(there) - 1} figures" if len(there) > 1 else ""
-        what = f"{there[0].name}{more}, of {flights(described)}"
+    removed = [*pages, *([several(len(drawn), "figure")] if drawn else [])]
+    if removed:
+        what = f"{listed(removed)}, of {flights(described)}"
         tell(f"{shown(folder)}: removed {what}: the batch goes on to {asked}; landsim plot draws them again")
 
 

@@ -1,4 +1,4 @@
-"""The page that one hands in: a summary as one self-contained HTML file.
+"""The page that one hands in: a summary as one self-contained HTML file, and the same as Markdown.
 
 ::
 
@@ -12,4 +12,5 @@
     traces       its series
     legend       what the legend beside a chart shows
     render       a document as HTML, with the scripts and styles that it needs inside
+    markdown     a document as Markdown, whose figures are the pictures beside it
 """
