@@ -20,9 +20,15 @@ PROTECTED = {"lateral": "cross_m", "vertical": "height_m"}
 """Protection levels, and the quantities of ``landsim.log.QUANTITIES`` that they are of."""
 OF_A_FAULT = Alarm.WRONG_LINE | Alarm.INCONSISTENT
 """Alarms that say that something is wrong; to be without lines is no fault of theirs."""
+AGAINST_LANDING = Alarm.UNAIDED | Alarm.INCONSISTENT
+"""Alarms that speak against a landing, as `landsim.go_around` has it: a wrong line is left out."""
+DETECTION_S = 1.0
+"""An alarm that is raised so long after a fault is over is not of that fault any more."""
 
 
-def integrity(log: Mapping[str, Array], end_row: int, decision_height: float, *, wrong: bool) -> dict[str, Any]:
+def integrity(
+    log: Mapping[str, Array], end_row: int, decision_height: float, commit_height: float, *, wrong: bool
+) -> dict[str, Any]:
     """How navigation's word held, and what became of a fault.
 
     A protection level is of the body's origin, an error that of the camera, which a log has: they differ by the error
@@ -34,8 +40,9 @@ def integrity(log: Mapping[str, Array], end_row: int, decision_height: float, *,
         The columns of ``landsim.log.COLUMNS``; n may be 0.
     end_row : int
         Of the touchdown, or n.
-    decision_height : float
-        Of the main wheels, m: an alarm that is over before flags no landing.
+    decision_height, commit_height : float
+        Of the main wheels, m: an alarm that stands neither at nor between them flags no landing, nor does one before
+        navigation has started.
     wrong : bool
         Whether the line at fault is another one, and not missing.
 
@@ -50,10 +57,12 @@ def integrity(log: Mapping[str, Array], end_row: int, decision_height: float, *,
         ``misleading_frames``       in which either error was greater while no alarm stood
         ``first_alarm_s``           when each of ``landsim.state.Alarm`` first stood
         ``fault_at_s``              of the first frame with a fault: a line missing, or another one in view
-        ``fault_detected_after_s``  from a wrong line to the first of `OF_A_FAULT`
+        ``fault_detected_after_s``  from a wrong line to the first of `OF_A_FAULT` that is raised because of it: since
+                                    it began, and within `DETECTION_S` of its end
         ``false_alarm``             whether one of these stood before there was a fault or an error beyond its level:
                                     that the lines contradict a state that is wrong is true
-        ``flagged``                 whether any alarm stood below the decision height, or a go-around began
+        ``flagged``                 whether one of `AGAINST_LANDING` stood between decision and commitment, or a
+                                    go-around began
     """
     time, rows = log["time_s"], np.arange(log["time_s"].size)
     climbing = (log["phase"] == Phase.GO_AROUND) & (rows < end_row)
@@ -61,7 +70,8 @@ def integrity(log: Mapping[str, Array], end_row: int, decision_height: float, *,
     alarm = np.nan_to_num(log["alarm"]).astype(int)
     # guidance is called at captures, which are the rows that say whether there was a fault
     frame = judged & np.isfinite(log["fault"])
-    landing = frame & ((log["phase"] == Phase.APPROACH) | (log["phase"] == Phase.FLARE))
+    flying = (log["phase"] == Phase.APPROACH) | (log["phase"] == Phase.FLARE)
+    landing = frame & flying
     exceeded = np.zeros(rows.size, dtype=bool)
     result: dict[str, Any] = {}
     for name, quantity in PROTECTED.items():
@@ -81,8 +91,13 @@ def integrity(log: Mapping[str, Array], end_row: int, decision_height: float, *,
     warned = judged & ((alarm & OF_A_FAULT) != 0)
     first_warned = _first(time, warned)
     causes = [at for at in (fault_at, _first(time, exceeded)) if at is not None]
-    detected = _first(time, warned & (time >= fault_at)) if wrong and fault_at is not None else None
-    low = judged & (log["wheel_height_m"] <= decision_height)
+    detected = None
+    if wrong and fault_at is not None:
+        over = float(time[np.flatnonzero(frame & (log["fault"] > 0.0))[-1]])
+        raised = warned & ~np.append(False, warned[:-1])
+        detected = _first(time, raised & (time >= fault_at) & (time <= over + DETECTION_S))
+    height = log["wheel_height_m"]
+    low = judged & flying & (height <= decision_height) & (height > commit_height)
     return result | {
         "misleading_frames": int(np.sum(exceeded & (alarm == 0))),
         "first_alarm_s": {
@@ -91,7 +106,7 @@ def integrity(log: Mapping[str, Array], end_row: int, decision_height: float, *,
         "fault_at_s": fault_at,
         "fault_detected_after_s": None if fault_at is None or detected is None else detected - fault_at,
         "false_alarm": first_warned is not None and all(first_warned < at for at in causes),
-        "flagged": bool(climbing.any() or (low & (alarm != 0)).any()),
+        "flagged": bool(climbing.any() or (low & ((alarm & AGAINST_LANDING) != 0)).any()),
     }
 
 

@@ -1,6 +1,7 @@
 """When a landing is given up: protection level, tracking and alarms, from the decision height down.  Pure.
 
-All heights are of the main wheels, by navigation.
+All heights are of the main wheels, by navigation.  The decision height is reached when they may be there, by the
+vertical protection level: navigation that does not know its height must not put the decision off by it.
 """
 
 import math
@@ -33,7 +34,8 @@ def doubt_of(config: GoAroundConfig, nav: NavState, height: float, above_slope: 
     above_slope : float
         Of the centre of gravity above the glide slope, m; NaN where it is not to be judged, in the flare.
     """
-    if not config.commit_height_m < height <= config.decision_height_m:
+    lowest = height if math.isnan(nav.vertical_protection) else height - nav.vertical_protection
+    if height <= config.commit_height_m or lowest > config.decision_height_m:
         return ""
     alarm = nav.alarm
     if alarm & Alarm.INCONSISTENT:

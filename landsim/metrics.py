@@ -244,6 +244,12 @@ def flare_row(log: Log, touchdown: Touchdown | None) -> int:
     return flare if touchdown is None else min(flare, touchdown.row)
 
 
+def _given_up_row(log: Log) -> int:
+    """The first row of a go-around, or the number of rows: what is flown on the way up follows no approach."""
+    rows = np.flatnonzero(log["phase"] == Phase.GO_AROUND)
+    return int(rows[0]) if rows.size else log["time_s"].size
+
+
 def navigation_errors(log: Log, end_row: int) -> dict[str, dict[str, dict[str, Any]]]:
     """Errors of vision and of the filter, a quantity, before ``end_row`` and past ``BEGIN``.
 
@@ -369,7 +375,7 @@ def flight_metrics(
     box = box_limits(touchdown, None if stop is None else stop["y_m"], verdict.outcome, scenario.box)
     if scenario.simulation.end == "touchdown":
         del box["stop_cross_max_m"]
-    rows, end_row = np.arange(n), n if touchdown is None else touchdown.row
+    rows, end_row = np.arange(n), min(n if touchdown is None else touchdown.row, _given_up_row(log))
     flown = log["body_x_m"] >= BEGIN
     airborne = flown & (rows < end_row)
     deviations = tracking_errors(log, scenario.approach.glide_slope_deg, scenario.approach.aim_point_m)
@@ -392,7 +398,11 @@ def flight_metrics(
         "consistency": consistency(log, touchdown),
         "coverage": coverage(log, touchdown),
         "integrity": integrity(
-            log, end_row, scenario.go_around.decision_height_m, wrong=scenario.fault.kind == "wrong"
+            log,
+            n if touchdown is None else touchdown.row,
+            scenario.go_around.decision_height_m,
+            scenario.go_around.commit_height_m,
+            wrong=scenario.fault.kind == "wrong",
         ),
         "end": end,
         "flight_time_s": float(log["time_s"][-1]) if n else 0.0,

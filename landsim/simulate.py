@@ -248,7 +248,7 @@ def _fly(
             plant.command(command)
         recorder.step(truth, navigator, airspeed, mount.tilt, tilt_reading)
         if phase is Phase.GO_AROUND:
-            if -truth.motion.item(2) >= climbed:
+            if -truth.motion.item(2) >= climbed and truth.motion.item(5) < 0.0:
                 return End("go_around", guidance.reason)
         elif diverged is not None and not omniscient:
             return End("diverged", diverged)

@@ -35,9 +35,29 @@ def test_each_limit_has_its_reason(nav: NavState, above: float, told: str) -> No
     assert (told in reason) if told else reason == ""
 
 
-@pytest.mark.parametrize(("height", "judged"), [(30.1, False), (30.0, True), (2.1, True), (2.0, False)])
-def test_it_is_judged_between_decision_and_commitment(height: float, judged: bool) -> None:
-    assert bool(doubt_of(LIMITS, GOOD._replace(alarm=Alarm.UNAIDED), height, 0.0)) is judged
+@pytest.mark.parametrize(
+    ("height", "level", "judged"),
+    [
+        (32.1, 2.0, False),  # the wheels may be at 30.1 m,
+        (32.0, 2.0, True),  # and here at 30 m
+        (2.1, 2.0, True),
+        (2.0, 2.0, False),
+        (59.0, 28.9, False),
+        (59.0, 29.0, True),
+        (30.1, math.nan, False),
+        (30.0, math.nan, True),
+    ],
+)
+def test_it_is_judged_between_decision_and_commitment(height: float, level: float, judged: bool) -> None:
+    nav = GOOD._replace(alarm=Alarm.UNAIDED, vertical_protection=level)
+    assert bool(doubt_of(LIMITS, nav, height, 0.0)) is judged
+
+
+def test_height_that_is_not_known_does_not_put_the_decision_off() -> None:
+    """In fog of 316 m, with a height that navigation has 17 m too great in the end: it climbs while it is high."""
+    flight = landsim.fly(landsim.load_scenario("weather"), seed=881)
+    assert flight.metrics["outcome"] == "go_around"
+    assert flight.log["wheel_height_m"].min() > 10.0
 
 
 def test_a_reason_has_to_last() -> None:

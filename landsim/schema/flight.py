@@ -56,7 +56,8 @@ class GoAroundConfig(Section):
 
     enabled: bool = False
     decision_height_m: Positive = 30.0
-    """Of the main wheels, from which down the landing is judged without pause,"""
+    """Of the main wheels, from which down the landing is judged without pause: from where they may be so low by the
+    vertical protection level,"""
     commit_height_m: NotNegative = 2.0
     """and below which it is gone on with."""
     lateral_limit_m: Positive = 10.0
@@ -70,13 +71,16 @@ class GoAroundConfig(Section):
     confirm_s: NotNegative = 0.3
     """So long a reason has to last."""
     end_height_m: Positive = 60.0
-    """Of the centre of gravity, at which the flight is over."""
+    """Of the centre of gravity, above which the flight is over once it climbs."""
 
     @model_validator(mode="after")
     def _heights_in_order(self) -> Self:
         if not self.commit_height_m < self.decision_height_m:
             told = f"must be below decision_height_m = {self.decision_height_m:g}, not {self.commit_height_m:g}"
             raise refused(told, "commit_height_m")
+        if not self.end_height_m > self.decision_height_m:
+            told = f"must be above decision_height_m = {self.decision_height_m:g}, not {self.end_height_m:g}"
+            raise refused(told, "end_height_m")
         return self
 
 

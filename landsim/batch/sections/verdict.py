@@ -182,7 +182,9 @@ def _protection(flights: Flights, risk: float) -> dict[str, Any]:
     """Errors beyond the protection level, against the risk that it is stated with.
 
     The frames of a flight share their error: the interval of their share is over flights.  Where no flight has one, the
-    share of the frames is no more than that of the flights with any.
+    share of the frames is no more than that of the flights with any.  Where few have, Student's interval is too narrow:
+    its upper end is then no less than the greatest share of a flight times the upper end of the flights' rate, and that
+    the level was kept is not said of fewer than `FEW`.
     """
     levels = []
     for name in PROTECTED:
@@ -193,6 +195,8 @@ def _protection(flights: Flights, risk: float) -> dict[str, Any]:
         low, high = ratio_interval(exceeded, frames)
         if n and any_beyond == 0:
             low, high = 0.0, float(clopper_pearson(0, n)[1])
+        elif high is not None:
+            high = max(high, float(np.max(exceeded / frames) * clopper_pearson(any_beyond, n)[1]))
         last = flights.numbers(f"{name}_protection_last_m")
         last = last[np.isfinite(last)]
         levels.append(
@@ -204,7 +208,7 @@ def _protection(flights: Flights, risk: float) -> dict[str, Any]:
                 "share": float(exceeded.sum() / frames.sum()) if n else None,
                 "low": low,
                 "high": high,
-                "state": None if low is None or high is None else _against(low, high, risk),
+                "state": None if low is None or high is None else _against(low, high, risk, any_beyond),
                 "last_m": float(np.median(last)) if last.size else None,
             }
         )
@@ -218,8 +222,14 @@ def _protection(flights: Flights, risk: float) -> dict[str, Any]:
     }
 
 
-def _against(low: float, high: float, risk: float) -> str:
-    return "more" if low > risk else "kept" if high <= risk else "open"
+FEW = 20
+"""Flights with an error beyond its level, of fewer of which nothing can be said of the share in which it is."""
+
+
+def _against(low: float, high: float, risk: float, flights: int) -> str:
+    if low > risk:
+        return "more"
+    return "kept" if high <= risk and (flights == 0 or flights >= FEW) else "open"
 
 
 def _faults(scenario: Scenario, flights: Flights) -> dict[str, Any]:
