@@ -5,10 +5,12 @@ import math
 import pytest
 
 import landsim
+from landsim.config import load_scenario
 from landsim.go_around import NO_DOUBT, Doubt, doubt_of, doubted, gives_up
+from landsim.guidance import INITIAL, guide, law_of
 from landsim.plugins import nav_state
 from landsim.schema.flight import GoAroundConfig
-from landsim.state import Alarm, NavState, Stage
+from landsim.state import Alarm, NavState, Phase, Stage
 
 LIMITS = GoAroundConfig(enabled=True)
 GOOD = nav_state(1.0, (-300.0, 1.0, -25.0), (39.0, 0.0, 2.0), (1, 0, 0, 0, 1, 0, 0, 0, 1), (0, 0, 0), 40.0, Stage.LATE)
@@ -67,6 +69,19 @@ def test_a_reason_has_to_last() -> None:
     assert calls == pytest.approx(3, abs=1)  # 0.3 s of tenths, which are not exact
     assert doubted(doubt, "", 20.0, 0.1) == NO_DOUBT
     assert not gives_up(LIMITS, Doubt("", 9.0))
+
+
+@pytest.mark.parametrize("drift", [1.0, -1.0, 2.0, -2.0, 0.0])
+def test_it_banks_against_its_drift(drift: float) -> None:
+    """As g tan(bank) = -k v asks for, to 5° at most: in the direction of the runway and not back to its middle."""
+    scenario = load_scenario("landing")
+    law = law_of(scenario.aircraft_config, scenario.approach, 9.78, 0.3, 1.0 / 30.0, LIMITS)
+    drifting = GOOD._replace(velocity=(39.0, drift, 2.0))
+    command, state = guide(law, drifting, INITIAL._replace(phase=Phase.GO_AROUND))
+    assert state.phase is Phase.GO_AROUND
+    bank = min(math.atan(law.bank_gain * abs(drift) / 9.78), math.radians(5.0))
+    assert command.roll == pytest.approx(-math.copysign(bank, drift))
+    assert drift * command.roll < 0.0 or drift == command.roll == 0.0
 
 
 def test_blinded_before_the_decision_height_it_climbs_out() -> None:

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import landsim
-from estimator.alignment import Incidence
+from estimator.alignment import Incidence, Start
 from estimator.covariance import THRESHOLD
 from estimator.fusion import NO_UPDATE, Update
+from estimator.line_fusion import LineVisionFilter
 from estimator.mount import Mount
 from estimator.so3 import IDENTITY, Array
 from estimator.strapdown import Inertial, Site
@@ -39,7 +40,7 @@ def test_vision_of_perfect_lines_is_the_truth() -> None:
     assert (across < 1.2 * (h + 225.0 / h) * borrowed + 0.01).all()
 
 
-def navigator_of(config: NavigationConfig) -> Navigator:
+def navigator_of(config: NavigationConfig, handover: Start | None = None) -> Navigator:
     """With a rate of 100 Hz, on an Earth that turns about a leaning axis."""
     return Navigator(
         camera_of(CameraConfig()),
@@ -51,6 +52,7 @@ def navigator_of(config: NavigationConfig) -> Navigator:
         Mount((0.0, 0.0, 0.0), 0.0),
         config,
         incidence_of(load_aircraft("pioneer")),
+        handover=handover,
     )
 
 
@@ -65,6 +67,21 @@ def test_body_rate_is_less_bias_and_the_turning_earth() -> None:
     navigator.propagate(np.array((0.001, 0.002, 0.003, 0.0, 0.0, 0.0)))
     # 0.1, 0.2, 0.3 rad/s as measured
     assert navigator.state(0.0).rate == pytest.approx((0.1 - 0.01 - 0.001, 0.2 - 0.02 + 0.002, 0.3 + 0.03 - 0.003))
+
+
+def test_what_is_felt_is_less_bias_and_scale_factor() -> None:
+    still = Inertial((0.0, 0.0, -9.0), (0.0, 0.0, 0.0), IDENTITY)
+    navigator = navigator_of(NavigationConfig(aiding="lines"), Start(still, 1e-6 * np.eye(15)))
+    running = navigator.filter
+    assert isinstance(running, LineVisionFilter)
+    running.bias = np.array((0.01, 0.02, -0.03, 0.4, 0.05, 0.6))
+    running.scale_factor = np.array((0.02, -0.05, 0.04, 0.1, 0.03, 0.1))
+    # 0.1, 0.2, 0.3 rad/s as measured, and 2 m/s² to the right
+    navigator.propagate(np.array((0.001, 0.002, 0.003, 0.0, 0.02, -0.098)))
+    state = navigator.state(0.0)
+    expected = (0.1 - 0.01 - 0.002 - 0.001, 0.2 - 0.02 + 0.01 + 0.002, 0.3 + 0.03 - 0.012 - 0.003)
+    assert state.rate == pytest.approx(expected, abs=2e-5)  # the Earth's share turns by as much as the body
+    assert state.side_force == pytest.approx(2.0 - 0.05 - 0.06)
 
 
 @pytest.mark.parametrize(("handover", "three_again"), [("in-view", True), ("latched", False)])

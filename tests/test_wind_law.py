@@ -103,6 +103,18 @@ def test_integrals_bring_it_back_and_end(law: WindLaw) -> None:
     assert steered(law, -1.0, NO_WIND, 1e6).steering == law.rollout_integral_max
 
 
+def test_on_the_ground_the_integral_steers(whole: Law) -> None:
+    """A second at 1 m to the right makes a heading of 0.01 rad to the left, which is steered for on the centreline."""
+    state = INITIAL._replace(phase=Phase.ROLLOUT, rollout_time=0.1)
+    right, middle = (nav((30.0, 0.0, 0.0), y=y, wheels=-0.05) for y in (1.0, 0.0))
+    assert guide(whole, middle, state)[0].steering == 0.0
+    for _ in range(30):
+        _, state = guide(whole, right, state)
+    steering = guide(whole, middle, state)[0].steering
+    assert steering == pytest.approx(-0.01 * whole.steering_gain, rel=1e-6)
+    assert steering < 0.0
+
+
 def test_the_flare_asks_for_no_more_sink_than_the_slope(whole: Law) -> None:
     """Against 13 m/s of head wind 27 m/s are made good: 1.41 m/s on 3°, and the pitch is that for it, not for more."""
     fast = guide(whole, nav((40.0, 0.0, 1.41), wheels=6.9, airspeed=36.0), INITIAL._replace(phase=Phase.FLARE))[0]
