@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import matplotlib as mpl
 import numpy as np
@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from numpy.typing import NDArray
+from scipy.stats import chi2
 from synthetic import empty_log, flight_log, parts
 
 from landsim import plots, report
@@ -352,6 +353,51 @@ def test_the_legend_of_the_consistency_holds_all_panels() -> None:
     assert names == ["each frame", "mean of 30 frames", "expected", "95 % of the frames", "gate"]
 
 
+def test_gates_are_those_that_were_flown() -> None:
+    """One in a million of chi-squared: of two degrees of freedom 2 ln 1e6 = 27.63, of six 38.26 by the tables."""
+    log = empty_log(5)
+    log["nis_dof"][:] = (2.0, 4.0, 6.0, np.nan, 6.0)
+    flown = SCENARIO.navigation
+    whole = navigation.gates(log, cast("Any", SimpleNamespace(navigation=flown)))
+    np.testing.assert_array_equal(whole, (np.nan, flown.gate_late, flown.gate_early, np.nan, flown.gate_early))
+    lines = flown.model_copy(update={"aiding": "lines", "line_gate_probability": 1e-6})
+    gates = navigation.gates(log, cast("Any", SimpleNamespace(navigation=lines)))
+    np.testing.assert_allclose(gates, chi2.isf(1e-6, log["nis_dof"]), rtol=1e-9)
+    assert gates[0] == pytest.approx(27.631, abs=1e-3)
+
+
+def test_errors_are_drawn_before_the_first_lines_and_after_the_last(flight: dict[str, Array]) -> None:
+    """A state that is handed over has errors at each frame, whether it saw a line or not."""
+    blind = (flight["time_s"] < 3.0) | (flight["time_s"] > 12.0)
+    squares = np.where(np.arange(blind.size) % 4 == 0, 9.0, np.nan)
+    log = flight | {"accepted": np.where(blind, np.nan, flight["accepted"]), "nees9": squares}
+    axes = next(
+        a for a in plots.navigation_errors(log, SCENARIO, measured(log)).axes if a.get_ylabel() == "cross error, m"
+    )
+    time, shown = line(axes, "fused, at camera frames")
+    known = np.isfinite(shown)
+    assert time[known][-1] > flight["time_s"][-1] - 0.1
+    early = np.isfinite(flight["fused_cross_m"][flight["time_s"] < 3.0])
+    assert (known & (time < 3.0)).sum() == pytest.approx(early.sum() / 4, abs=2)
+
+
+def test_a_go_around_is_marked_where_it_begins(flight: dict[str, Array]) -> None:
+    """From 12 m of height, out of the approach: no flare is marked, and the climb has no mark of one either."""
+    begins = int(np.flatnonzero(flight["wheel_height_m"] < 12.0)[0])
+    log = {name: values[: begins + 200] for name, values in flight.items()}
+    log["phase"] = np.where(np.arange(begins + 200) >= begins, 5.0, log["phase"])
+    side, _, last = plots.profile_and_plan(log, SCENARIO, measured(log, "go_around")).axes
+    assert [text.get_text() for text in side.texts] == ["go-around"]
+    _, y = line(last, "go-around begins, by guidance")
+    assert y[0] == log["wheel_height_m"][begins]
+    assert not [artist for artist in last.lines if "flare" in str(artist.get_label())]
+    # out of the flare both are
+    log["phase"][begins - 20 : begins] = 2.0
+    side, _, last = plots.profile_and_plan(log, SCENARIO, measured(log, "go_around")).axes
+    assert [text.get_text() for text in side.texts] == ["flare", "go-around"]
+    assert line(last, "flare begins, by guidance")[1][0] == log["wheel_height_m"][begins - 20]
+
+
 def test_names_of_marks_stay_inside_and_apart() -> None:
     figure = Figure(figsize=(4.0, 3.0))
     axes = figure.add_axes((0.2, 0.2, 0.7, 0.5))
@@ -385,7 +431,7 @@ def test_the_airspeed_command_is_that_of_the_approach(flight: dict[str, Array]) 
     phase = np.interp(time, flight["time_s"], flight["phase"])
     np.testing.assert_array_equal(np.isfinite(shown), phase == 1.0)
     names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert [name.split()[-1] for name in names] == ["acquire", "approach", "flare", "rollout", "stopped", "go_around"]
+    assert [name.split()[-1] for name in names] == ["acquire", "approach", "flare", "rollout", "stopped", "go-around"]
 
 
 def test_a_crash_is_marked_and_ends_the_pictures(flight: dict[str, Array]) -> None:

@@ -101,7 +101,8 @@ def controls_and_attitude(log: Log, scenario: "Scenario", metrics: dict[str, Any
         if i % lines == lines - 1 or i == len(rows) - 1:
             axes.set_xlabel("time, s")
     handles: list[Any] = [Rectangle((0, 0), 1, 1, fc=shade, ec=GREY, lw=0.6) for shade in PHASE_SHADES.values()]
-    names = [f"{'by guidance: ' if phase is Phase.ACQUIRE else ''}{phase.name.lower()}" for phase in PHASE_SHADES]
+    names = [phase.name.lower().replace("_", "-") for phase in PHASE_SHADES]
+    names[0] = f"by guidance: {names[0]}"
     if failed is not None:
         handles.append(Line2D([], [], **CRASH))
         names.append(failed.name)

@@ -47,6 +47,7 @@ FLARE_HEIGHT = 15.0
 """The lowest panel begins with the wheels this high, m."""
 AFTER_S = 2.0
 """It ends as long after the touchdown, s."""
+PHASES_MARKED = ((Phase.FLARE, "flare"), (Phase.GO_AROUND, "go-around"))
 CRASH: dict[str, Any] = {"color": VERMILION, "mec": BLACK, "mew": 0.6, "ms": 8.0, "ls": "none", "zorder": 4.0}
 
 
@@ -145,10 +146,13 @@ def _flare_view(axes: Axes, log: Log, scenario: "Scenario", metrics: dict[str, A
     axes.set_ylim(min(-0.04 * top, 1.2 * float(height[rows].min(initial=0.0))), top)
     if rows.size:
         axes.set_xlim(*span(x[rows], (float(x[rows[0]]) - 1.0, float(x[rows[0]]) + 1.0)))
-        flare = rows[log["phase"][rows] >= Phase.FLARE]
+        flare = rows[log["phase"][rows] == Phase.FLARE]
         if flare.size and (touchdown is None or time[flare[0]] <= touchdown["time_s"]):
             start = int(flare[0])
             axes.plot(x[start], height[start], "o", color=BLUE, ms=5, label="flare begins, by guidance")
+        up = np.flatnonzero(log["phase"] == Phase.GO_AROUND)
+        if up.size and up[0] in rows:
+            axes.plot(x[up[0]], height[up[0]], "^", color=BLUE, ms=6, label="go-around begins, by guidance")
     else:
         axes.set_xticks([])
     if failed is not None and failed.row in rows:
@@ -172,10 +176,10 @@ def _flare_view(axes: Axes, log: Log, scenario: "Scenario", metrics: dict[str, A
 
 
 def _marks(log: Log, metrics: dict[str, Any], failed: Failure | None) -> list[tuple[float, str]]:
-    """Flare, touchdown, stop and a crash, by where the centre of gravity then was."""
+    """Flare, touchdown, stop, go-around and a crash, by where the centre of gravity then was."""
     x, time = log["body_x_m"], log["time_s"]
-    flare = np.flatnonzero(log["phase"] >= Phase.FLARE)
-    marks = [(float(x[flare[0]]), "flare")] if flare.size else []
+    begins = ((np.flatnonzero(log["phase"] == phase), name) for phase, name in PHASES_MARKED)
+    marks = [(float(x[rows[0]]), name) for rows, name in begins if rows.size]
     if metrics["touchdown"] is not None:
         marks.append((float(np.interp(metrics["touchdown"]["time_s"], time, x)), "touchdown"))
     if metrics["stop"] is not None:

@@ -8,8 +8,10 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
+from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from estimator.single_lines import gates_of
 from landsim.log import QUANTITIES
 from landsim.metrics import Array, Log, error
 from landsim.plots.style import (
@@ -55,7 +57,7 @@ def navigation_errors(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -
     grid = figure.add_gridspec(3, 2, left=0.1, right=0.985, top=0.818, bottom=0.055, hspace=0.34, wspace=0.3)
     failed = failure(log, scenario, metrics)
     log = until_shortly_after(log, failed)
-    few, frames = thinned(log), np.isfinite(log["accepted"])
+    few, frames = thinned(log), at_frames(log)
     marks = event_times(log, metrics, failed)
     unstarted = usable_frames(log)
     uncertain = gives_covariance(log)
@@ -134,6 +136,26 @@ def gives_covariance(log: Log) -> bool:
     return bool(np.isfinite(log["sigma_cross_m"]).any())
 
 
+def at_frames(log: Log) -> NDArray[np.bool_]:
+    """Whether a row is that of a camera frame, with lines in it or without: before the first and after the last too."""
+    # an error has its square at each frame once there is a covariance; without one, captures are the next best
+    named = log["nees9"] if gives_covariance(log) else log["fault"]
+    result: NDArray[np.bool_] = np.isfinite(log["accepted"]) | np.isfinite(named)
+    return result
+
+
+def gates(log: Log, scenario: "Scenario") -> Array:
+    """The gate that each row's normalised innovation squared was held against; NaN where there was none."""
+    config = scenario.navigation
+    by_degrees = {6.0: config.gate_early, 4.0: config.gate_late}
+    if config.aiding == "lines":
+        by_degrees = dict(zip((2.0, 4.0, 6.0), gates_of(config.line_gate_probability).tolist(), strict=True))
+    result = np.full(log["nis_dof"].size, math.nan)
+    for degrees, gate in by_degrees.items():
+        result[log["nis_dof"] == degrees] = gate
+    return result
+
+
 @rc_context(STYLE)
 def consistency(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -> Figure:
     """Normalised errors and innovations squared against the bounds that hold 95 % of a consistent filter's frames.
@@ -148,15 +170,10 @@ def consistency(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -> Figu
     log = until_shortly_after(log, failed)
     time = log["time_s"]
     ones = np.ones(time.size)
-    gates = np.select(
-        [log["nis_dof"] == 6.0, log["nis_dof"] == 4.0],
-        [scenario.navigation.gate_early * ones, scenario.navigation.gate_late * ones],
-        math.nan,
-    )
     panels = (
         ("nees9", "NEES, 9 states (1)", 9.0 * ones, None),
         ("nees15", "NEES, 15 states (1)", 15.0 * ones, None),
-        ("nis", "NIS (1)", log["nis_dof"], gates),
+        ("nis", "NIS (1)", log["nis_dof"], gates(log, scenario)),
     )
     marks = event_times(log, metrics, failed)
     unstarted = usable_frames(log)
@@ -191,7 +208,10 @@ def consistency(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -> Figu
             continue
         for handle, of in zip(*axes.get_legend_handles_labels(), strict=True):
             handles.setdefault(of, handle)
-        axes.set_ylim(0.4 * chdtri(float(n.min()), 0.975), 1.6 * max(largest(values), chdtri(float(n.max()), 0.025)))
+        top = 1.6 * max(largest(values), chdtri(float(n.max()), 0.025))
+        if gate is not None:
+            top = max(top, 1.2 * largest(gate[rows]))
+        axes.set_ylim(0.4 * chdtri(float(n.min()), 0.975), top)
     axes.set_xlabel("time, s")
     if handles:
         legend_in_head(figure, list(handles.values()), list(handles))
