@@ -54,10 +54,16 @@ def nav(
     wheels: float = 20.0,
 ) -> NavState:
     c, s = math.cos(yaw), math.sin(yaw)
-    state = nav_state(
-        1.0, (-300.0, y, -wheels - 0.84), velocity, (c, -s, 0, s, c, 0, 0, 0, 1), (0, 0, 0), airspeed, Stage.LATE
+    return nav_state(
+        1.0,
+        (-300.0, y, -wheels - 0.84),
+        velocity,
+        (c, -s, 0, s, c, 0, 0, 0, 1),
+        (0, 0, 0),
+        airspeed,
+        Stage.LATE,
+        side_force=side_force,
     )
-    return state._replace(side_force=side_force)
 
 
 def test_the_wind_is_ground_velocity_less_airspeed_along_the_nose(law: WindLaw) -> None:
@@ -71,6 +77,13 @@ def test_the_wind_is_ground_velocity_less_airspeed_along_the_nose(law: WindLaw) 
     # with the nose being turned onto the runway there is sideslip, and the wind is no longer told so
     held = felt(law, nav((33.0, 0.0, 2.0), 0.0), memory._replace(align=0.5), 1.0)
     assert held.cross == memory.cross
+
+
+def test_the_side_force_is_felt_quickly_and_with_its_sign(law: WindLaw) -> None:
+    pushed = felt(law, nav(side_force=1.5), NO_WIND, DT)
+    assert pushed.side_force == 1.5
+    later = felt(law, nav(side_force=-1.5), pushed, law.side_force_time)
+    assert later.side_force == pytest.approx(-1.5 + 3.0 * math.exp(-1.0))
 
 
 @pytest.mark.parametrize(("head", "added"), [(-5.0, 0.0), (0.0, 0.0), (5.0, 1.5), (40.0, 4.0)])

@@ -36,11 +36,12 @@ from landsim.plugins.guard import PlugInFault
 from landsim.plugins.interface import Controller, ControllerSetup, Estimator, EstimatorSetup, nav_state, not_ready
 from landsim.plugins.loading import controller_of, estimator_of, refuse_bad, versions_of
 from landsim.plugins.own import OwnController, landsim_controller, landsim_estimator
-from landsim.state import CameraFrame, Command, ImuSample, LineReading, NavState, Phase, Stage
+from landsim.state import Alarm, CameraFrame, Command, ImuSample, LineReading, NavState, Phase, Stage
 
 __all__ = [
     "NO_UPDATE",
     "AircraftConfig",
+    "Alarm",
     "ApproachConfig",
     "CameraFrame",
     "Command",

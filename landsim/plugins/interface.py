@@ -183,7 +183,10 @@ class Controller(Protocol):
     """
 
     def guide(self, nav: NavState) -> tuple[Command, Phase]:
-        """Steer; called once before the first measurement, then after each camera frame.
+        """Steer; called once a camera interval, from time zero on, after what was measured by then.
+
+        At time zero the order is `Estimator.take_airspeed`, `Estimator.observe` if frames arrive without latency,
+        `Estimator.state`, and this.
 
         Parameters
         ----------
@@ -209,8 +212,12 @@ def nav_state(
     rate: Sequence[float] | Array,
     airspeed: float,
     stage: Stage,
+    *,
+    side_force: float = 0.0,
 ) -> NavState:
     """A navigation state that is ready, with the Euler angles of its attitude.
+
+    It states no protection level and no alarm; ``_replace`` puts them in.
 
     Parameters
     ----------
@@ -226,11 +233,24 @@ def nav_state(
         m/s.
     stage : Stage
         What the last camera frame gave.
+    side_force : float, optional
+        Specific force along body y, less the estimated bias, m/s²; what holds the track in a cross wind goes by it.
     """
     attitude = flat(R_runway_from_body)
     roll, pitch, yaw = to_euler(attitude)
     return NavState(
-        time, True, _vector(position), _vector(velocity), attitude, roll, pitch, yaw, _vector(rate), airspeed, stage
+        time,
+        True,
+        _vector(position),
+        _vector(velocity),
+        attitude,
+        roll,
+        pitch,
+        yaw,
+        _vector(rate),
+        airspeed,
+        stage,
+        side_force=float(side_force),
     )
 
 
