@@ -46,7 +46,9 @@ pose                what the two solvers return
 mount               how the camera sits on the body
 innovation          a camera frame as a measurement of the filter's errors
 alignment           the start of the filter
+single_lines        each line by itself as a measurement, also of the camera's calibration
 fusion              the filter; not imported from here, since filterpy takes a second to import
+line_fusion         the filter of single lines, with calibration and scale factors in its state; likewise
 
 The measurement that the filter takes from a frame is the vision pose less the predicted one, to first order in the
 lines at the predicted pose: two or three lines and the four or six numbers of the pose fix one another there, and the
