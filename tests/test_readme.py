@@ -26,7 +26,7 @@ def test_python_examples_run() -> None:
 
 def test_commands_are_known() -> None:
     lines = [line for block in blocks("") for line in block.splitlines() if line.startswith("landsim ")]
-    assert len(lines) == 20
+    assert len(lines) == 26
     for line in lines:
         command, *arguments = shlex.split(line, comments=True)[1:]
         known = landsim.commands[command]
