@@ -40,6 +40,8 @@ COASTING_S = 1.0
 """A filter that has believed no frame for longer is said to coast."""
 WITHIN = NormalDist().inv_cdf(0.975)
 """Standard deviations either side of the mean that hold 95 % of a normal distribution."""
+EVERY = slice(None)
+"""All rows of a log."""
 BOUNCE_S = 0.1
 """Both main wheels in the air for longer than this, between contacts, is a bounce."""
 
@@ -88,23 +90,25 @@ def p95(values: ArrayLike) -> float | None:
     return float(np.percentile(np.abs(finite), 95.0)) if finite.size else None
 
 
-def error(log: Log, source: str, quantity: str) -> Array:
+def error(log: Log, source: str, quantity: str, rows: Any = EVERY) -> Array:
     """Error of ``vision`` or ``fused`` in a quantity of ``landsim.log.QUANTITIES``, in its unit; angles are wrapped."""
-    difference = log[f"{source}_{quantity}"] - log[f"true_{quantity}"]
+    difference = log[f"{source}_{quantity}"][rows] - log[f"true_{quantity}"][rows]
     return wrapped_deg(difference) if quantity.endswith("_deg") else difference
 
 
-def main_wheels(log: Log, aircraft: "AircraftConfig") -> tuple[Array, Array]:
-    """Along and cross position of the midpoint of the main wheels, runway frame, m: the cg's + R_runway_from_body m.
+def main_wheels(log: Log, aircraft: "AircraftConfig", rows: Any = EVERY) -> tuple[Array, Array]:
+    """Along and cross position of the midpoint of the main wheels in these rows, runway frame, m.
 
-    R_runway_from_body is that of ``estimator.so3.from_euler``; m is the wheels' mean position in body axes.
+    That is the cg's + R_runway_from_body m, with R_runway_from_body that of ``estimator.so3.from_euler`` and m the
+    wheels' mean position in body axes.
     """
     f, r, d = aircraft.gear.main_wheels_body_m
-    roll, pitch, yaw = (log[f"body_{angle}_deg"] * DEG for angle in ("roll", "pitch", "yaw"))
+    roll, pitch, yaw = (log[f"body_{angle}_deg"][rows] * DEG for angle in ("roll", "pitch", "yaw"))
     sr, cr, sp, cp, sy, cy = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch), np.sin(yaw), np.cos(yaw)
     ahead = cp * f + sr * sp * r + cr * sp * d  # the components level ahead and level right of the nose
     right_of = cr * r - sr * d
-    return log["body_x_m"] + cy * ahead - sy * right_of, log["body_y_m"] + sy * ahead + cy * right_of
+    x, y = log["body_x_m"][rows], log["body_y_m"][rows]
+    return x + cy * ahead - sy * right_of, y + sy * ahead + cy * right_of
 
 
 def find_touchdown(log: Log, aircraft: "AircraftConfig") -> Touchdown | None:
@@ -117,7 +121,7 @@ def find_touchdown(log: Log, aircraft: "AircraftConfig") -> Touchdown | None:
     if not rows.size:
         return None
     row = int(rows[0])
-    x, y = main_wheels(log, aircraft)
+    (x,), (y,) = main_wheels(log, aircraft, slice(row, row + 1))
     time, height = log["time_s"], log["wheel_height_m"]
     if row >= 1:
         first, last = max(row - 2, 0), max(row - 1, 1)
@@ -127,8 +131,8 @@ def find_touchdown(log: Log, aircraft: "AircraftConfig") -> Touchdown | None:
     return Touchdown(
         row=row,
         time=float(time[row]),
-        x=float(x[row]),
-        y=float(y[row]),
+        x=float(x),
+        y=float(y),
         sink_rate=sink_rate,
         ground_speed=float(np.hypot(log["true_velocity_x_mps"][row], log["true_velocity_y_mps"][row])),
         pitch_deg=float(log["body_pitch_deg"][row]),
@@ -310,7 +314,7 @@ def coverage(log: Log, touchdown: Touchdown | None) -> dict[str, Any]:
     rows = np.arange(log["time_s"].size)
     counted = np.isfinite(log["nees9"]) & (rows < (rows.size if touchdown is None else touchdown.row))
     shares = {
-        q: _mean(np.abs(error(log, "fused", q)[counted]) <= WITHIN * log[f"sigma_{q}"][counted]) for q in QUANTITIES
+        q: _mean(np.abs(error(log, "fused", q, counted)) <= WITHIN * log[f"sigma_{q}"][counted]) for q in QUANTITIES
     }
     return {"frames": int(np.sum(counted)), **shares}
 
@@ -435,7 +439,7 @@ def _contact_faults(
     if touchdown.sink_rate > limit:
         text = f"sink rate {touchdown.sink_rate:.2f} m/s at touchdown, the gear bears {limit:g} m/s"
         faults.append((touchdown.row, Verdict("crashed", text)))
-    x, y = (values[touchdown.row :] for values in main_wheels(log, aircraft))
+    x, y = main_wheels(log, aircraft, slice(touchdown.row, None))
     on_it = (x >= 0.0) & (x <= scenario.runway.length_m) & (np.abs(y) <= 0.5 * scenario.runway.width_m)
     # a wheel that touched while the aircraft was going around says nothing of where it flies afterwards
     climbing = (log["phase"] == Phase.GO_AROUND) & ~_on_mains(log)

@@ -49,6 +49,8 @@ from landsim.state import Alarm, CameraFrame, ImuSample, NavState, Stage
 from landsim.units import DEG, STANDARD_GRAVITY
 
 NAN = math.nan
+_NONE, _EARLY, _LATE, _NO_ALARM = Stage.NONE, Stage.EARLY, Stage.LATE, Alarm.NONE
+"""A member looked up in its class costs as much as a call."""
 
 
 def mount_of(config: MountConfig) -> Mount:
@@ -179,7 +181,7 @@ class Navigator:
         self._earth_rate = np.array(site.earth_rate)
         self._latch = config.handover == "latched"
         self._late = False
-        self.stage = Stage.NONE
+        self.stage = _NONE
         self.filter: InertialVisionFilter | None = None
         self._lag = round(latency / imu_dt)
         self._waiting: deque[ImuSample] = deque()
@@ -271,8 +273,9 @@ class Navigator:
         update = self.filter.observe(lines, frame.tilt)
         if update.degrees > 0:
             self._rejected = 0 if update.accepted else self._rejected + 1
-        self.stage = Stage.NONE if not update.accepted else Stage.EARLY if update.degrees == 6 else Stage.LATE
-        return FrameResult(update, self.stage, roll, self._late)
+        self.stage = _NONE if not update.accepted else _EARLY if update.degrees == 6 else _LATE
+        found = _BY_DEGREES[update.degrees]
+        return FrameResult(update, self.stage, roll, self._late, found, found if update.accepted else 0)
 
     def _observe_lines(self, running: LineVisionFilter, frame: CameraFrame, lines: Array, roll: float) -> FrameResult:
         """A frame of which each line counts by itself."""
@@ -282,17 +285,17 @@ class Navigator:
         if found:
             self._rejected = 0 if believed else self._rejected + 1
         threshold = bool(believed & (1 << THRESHOLD))
-        self.stage = Stage.NONE if not believed else Stage.EARLY if threshold else Stage.LATE
+        self.stage = _NONE if not believed else _EARLY if threshold else _LATE
         return FrameResult(update, self.stage, roll, self._late, found, believed)
 
     def _align(self, readings: Array, tilt: float) -> FrameResult:
         """One of the first frames: the filter starts when there are enough."""
-        self.stage = Stage.NONE
+        self.stage = _NONE
         lines = _observed(readings, self._noise_px)
         left, threshold, right = lines[:, :3]
         solution = three_line_pose(self._camera, left, threshold, right, runway_width=self._width)
         if not solution.valid:
-            return FrameResult(NO_UPDATE, Stage.NONE, NAN, late=False)
+            return FrameResult(NO_UPDATE, _NONE, NAN, late=False)
         x, y, z = solution.position.tolist()
         body = body_from_camera((x, y, z), solution.R_cam_from_runway, tilt, self._mount.lever)
         if self._alignment.add(body, self.airspeed):
@@ -308,8 +311,8 @@ class Navigator:
                 self._start(self._alignment.start(self.airspeed, pose, self._mount, self._imu))
             else:
                 self._start(self._start_of_lines(eye, lines, _extent(readings), state.numbers(), tilt))
-        self.stage = Stage.EARLY
-        return FrameResult(NO_UPDATE, Stage.EARLY, NAN, late=False)
+        self.stage = _EARLY
+        return FrameResult(NO_UPDATE, _EARLY, NAN, late=False)
 
     def _start_of_lines(self, eye: Array, lines: Array, extent: Array, nominal: Array, tilt: float) -> Start:
         """The start with the calibration's part in it."""
@@ -354,12 +357,9 @@ class Navigator:
         """Why the filter is no longer to be believed, if it is not."""
         if self.filter is None:
             return None
-        p = self.filter.covariance
-        nominal = self.filter.nominal
-        sigma2 = p.item(0, 0) + p.item(1, 1) + p.item(2, 2)
-        x, y, z = nominal.item(0), nominal.item(1), nominal.item(2)
-        if not math.isfinite(sigma2 + x + y + z):
-            return "its numbers are not finite"
+        sigma2 = _position_variance(self.filter.covariance, self.filter.nominal)
+        if not math.isfinite(sigma2):
+            return "its position is not finite, or a variance of it is negative"
         if sigma2 > self._config.max_position_sigma_m**2:
             return f"its position sigma is {math.sqrt(sigma2):.1f} m"
         if self._rejected > self._config.max_rejected_frames:
@@ -402,32 +402,34 @@ class Navigator:
         bias = _NO_BIAS if running is None else running.bias
         if isinstance(running, LineVisionFilter):
             bias = bias + running.scale_factor * self._sample / self._dt
-        n = _motion(self.nominal, bias, self._sample, self._earth_rate, self._dt).tolist()
-        lateral, vertical = NAN, NAN
-        if (covariance := self.covariance) is not None:
-            lateral = self._protection * math.sqrt(covariance.item(1, 1))
-            vertical = self._protection * math.sqrt(covariance.item(2, 2))
-        return NavState(
-            time,
-            running is not None,
-            (n[0], n[1], n[2]),
-            (n[3], n[4], n[5]),
-            (n[6], n[7], n[8], n[9], n[10], n[11], n[12], n[13], n[14]),
-            n[15],
-            n[16],
-            n[17],
-            (n[18], n[19], n[20]),
-            self.airspeed,
-            self.stage,
-            lateral,
-            vertical,
-            Alarm.NONE if self._monitor is None else self._monitor.alarm(time),
-            n[21],
+        known = self.known
+        covariance = _NOTHING_KNOWN if known is None else known.covariance
+        n = _stated(self.nominal, bias, self._sample, self._earth_rate, self._dt, covariance, self._protection).tolist()
+        return tuple.__new__(  # what NavState(...) does, at half the price
+            NavState,
+            (
+                time,
+                running is not None,
+                (n[0], n[1], n[2]),
+                (n[3], n[4], n[5]),
+                (n[6], n[7], n[8], n[9], n[10], n[11], n[12], n[13], n[14]),
+                n[15],
+                n[16],
+                n[17],
+                (n[18], n[19], n[20]),
+                self.airspeed,
+                self.stage,
+                n[22],
+                n[23],
+                _NO_ALARM if self._monitor is None else self._monitor.alarm(time),
+                n[21],
+            ),
         )
 
 
 _UNKNOWN = Inertial((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), IDENTITY).numbers()
 _NO_BIAS = np.zeros(6)
+_NOTHING_KNOWN = np.full((STATES, STATES), NAN)
 
 
 _variances = compiled(unguarded_variances)
@@ -465,6 +467,15 @@ def _without_threshold(readings: Array, noise_px: float, latch: bool, late: bool
 
 
 @compiled
+def _position_variance(covariance: Array, nominal: Array) -> float:
+    """Of the three axes together, m²; NaN where the position is not finite or a variance is negative."""
+    x, y, z = covariance[0, 0], covariance[1, 1], covariance[2, 2]
+    if not (x >= 0.0 and y >= 0.0 and z >= 0.0 and math.isfinite(nominal[0] + nominal[1] + nominal[2])):
+        return math.nan
+    return float(x + y + z)
+
+
+@compiled
 def _camera_roll(nominal: Array, tilt: float) -> float:
     """Roll of the camera triad (rad), with the mount angle as read."""
     right, down, _ = camera_axes(unpacked(nominal).attitude, tilt)
@@ -472,17 +483,23 @@ def _camera_roll(nominal: Array, tilt: float) -> float:
 
 
 @compiled
-def _motion(nominal: Array, bias: Array, sample: Array, earth_rate: Array, dt: float) -> Array:
-    """What `NavState` says of the motion (22,): position, velocity, attitude, Euler angles, body rates and side force.
+def _stated(
+    nominal: Array, bias: Array, sample: Array, earth_rate: Array, dt: float, covariance: Array, protection: float
+) -> Array:
+    """The numbers of `NavState` (24,).
 
-    The rates are those relative to the ground: of the inertial unit's last sample, less bias and the Earth's rotation.
+    Position, velocity, attitude, Euler angles, body rates, side force, lateral and vertical protection level.  The
+    rates are those relative to the ground: of the inertial unit's last sample, less bias and the Earth's rotation.  A
+    protection level is so many standard deviations.
     """
     earth = rotate_back(unpacked(nominal).attitude, (earth_rate[0], earth_rate[1], earth_rate[2]))
     angles = euler(nominal)
-    result = np.empty(22)
+    result = np.empty(24)
     result[:15] = nominal[:15]
     for i in range(3):
         result[15 + i] = angles[i]
         result[18 + i] = sample[i] / dt - bias[i] - earth[i]
     result[21] = sample[4] / dt - bias[4]
+    result[22] = protection * math.sqrt(covariance[1, 1])
+    result[23] = protection * math.sqrt(covariance[2, 2])
     return result

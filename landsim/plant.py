@@ -37,7 +37,7 @@ TERRAIN_HEIGHT = 30.0
 """m; above it no aircraft feels the ground: the terrain is left as it is."""
 CONTACT_HEIGHT = 10.0
 """m; above it none touches the ground: contacts are not asked."""
-_ON_GROUND = MOTION + 7
+_ON_GROUND = MOTION + 6
 _WIND = 15
 """Where the site's numbers end with the wind."""
 _GUST = ("atmosphere/gust-north-fps", "atmosphere/gust-east-fps", "atmosphere/gust-down-fps")
@@ -52,7 +52,6 @@ _READ = (
     "position/ecef-x-ft",
     "position/ecef-y-ft",
     "position/ecef-z-ft",
-    "position/geod-alt-ft",
     "position/lat-geod-rad",
     "position/long-gc-rad",
     "velocities/ecef-x-fps",
@@ -66,7 +65,6 @@ _READ = (
     "fcs/left-aileron-pos-rad",
     "fcs/rudder-pos-rad",
     "fcs/throttle-pos-norm",
-    "propulsion/engine/thrust-lbs",
 )
 _WHEELS = ("gear/unit[0]/WOW", "gear/unit[1]/WOW", "gear/unit[2]/WOW")
 _FEED = (
@@ -302,8 +300,9 @@ class Plant:
         self._structure = tuple(contact.get_double_value for contact in structure if contact is not None)
         self._feed = tuple(node(fdm, name).set_double_value for name in _FEED)
         self._command = tuple(node(fdm, name).set_double_value for name in _COMMAND)
+        self._altitude = node(fdm, "position/geod-alt-ft").get_double_value
         self._set_terrain = node(fdm, "position/terrain-elevation-asl-ft").set_double_value
-        self._loading = loading
+        self._loading, self._cg_forward = loading, loading.cg_forward
         self._set_gust = tuple(node(fdm, name).set_double_value for name in _GUST)
         self._turn = tuple(node(fdm, name).get_double_value for name in _TURN)
         if loading != NOMINAL and any(manager.get_node(f"{_BALLAST}[{i}]", False) is None for i in range(3)):
@@ -376,7 +375,7 @@ class Plant:
         self.trim = TrimPoint(
             alpha=self._get("aero/alpha-rad"),
             elevator=truth.elevator,
-            thrust=truth.thrust,
+            thrust=LBF * self._get("propulsion/engine/thrust-lbs"),
             pitch=self._get("attitude/theta-rad"),
             throttle=truth.throttle,
         )
@@ -518,18 +517,17 @@ class Plant:
 
     def _truth(self) -> Truth:
         (
-            x, y, z, altitude, latitude, longitude, vx, vy, vz, phi, theta, psi, airspeed,
-            elevator, aileron, rudder, throttle, thrust,
+            x, y, z, latitude, longitude, vx, vy, vz, phi, theta, psi, airspeed, elevator, aileron, rudder, throttle,
         ) = [read() for read in self._read]  # fmt: skip
         motion, time, airspeed = next(self._rows), self._steps * self._dt, FT * airspeed
         down, cosine = _motion(
             motion, self._site, x, y, z, vx, vy, vz, latitude, longitude, phi, theta, psi,
-            time, airspeed, elevator, aileron, rudder, throttle, LBF * thrust,
+            time, airspeed, elevator, aileron, rudder, throttle,
         )  # fmt: skip
         nose = left = right = touching = False
         if down > -TERRAIN_HEIGHT:
             # here the ellipsoid's normal through the aircraft meets the runway's plane
-            self._set_terrain(altitude + down / (FT * cosine))
+            self._set_terrain(self._altitude() + down / (FT * cosine))
             if down > -CONTACT_HEIGHT:
                 on_nose, on_left, on_right = self._wheels
                 nose, left, right = on_nose() != 0.0, on_left() != 0.0, on_right() != 0.0
@@ -538,9 +536,9 @@ class Plant:
                 for touches in self._structure:
                     if touches() != 0.0:
                         touching = True
-        if self._loading.cg_forward != 0.0:
+        if self._cg_forward != 0.0:
             # from the centre of gravity, which JSBSim tells of, back to where it nominally is
-            back, (yawing, pitching) = -self._loading.cg_forward, [read() for read in self._turn]
+            back, (yawing, pitching) = -self._cg_forward, [read() for read in self._turn]
             attitude = inertial(motion).attitude
             motion[:3] += rotate(attitude, (back, 0.0, 0.0))
             motion[3:6] += rotate(attitude, (0.0, back * yawing, -back * pitching))
@@ -574,15 +572,13 @@ def _motion(
     aileron: float,
     rudder: float,
     throttle: float,
-    thrust: float,
 ) -> tuple[float, float]:
     """Write to `motion`, which is `Truth.motion`, from JSBSim's position and velocity (ECEF, ft) and angles (rad).
 
     The rest of its numbers stands there as it is given, with no wheel on the ground.
 
     `site` is R_runway_from_ecef times a foot, the origin in its axes (m), latitude, longitude, heading and the wind
-    (runway frame, m/s).  Returned
-    are the z of the position (m) and the cosine of the angle between the verticals.
+    (runway frame, m/s).  Returned are the z of the position (m) and the cosine of the angle between the verticals.
     """
     cosine, attitude = _attitude(site[12], site[13], site[14], latitude, longitude, phi, theta, psi)
     for i in range(3):
@@ -592,7 +588,7 @@ def _motion(
     for i in range(9):
         motion[6 + i] = attitude[i]
     motion[15], motion[16], motion[17], motion[18] = time, airspeed, elevator, aileron
-    motion[19], motion[20], motion[21] = rudder, throttle, thrust
-    motion[22], motion[23], motion[24] = 0.0, 0.0, 0.0
-    motion[25], motion[26], motion[27] = site[15], site[16], site[17]
+    motion[19], motion[20] = rudder, throttle
+    motion[21], motion[22], motion[23] = 0.0, 0.0, 0.0
+    motion[24], motion[25], motion[26] = site[15], site[16], site[17]
     return motion[2], cosine

@@ -73,9 +73,18 @@ def _take_down(rows: Array, row: int, truth: Array, nominal: Array, pitot: float
     rows[row, NUMBERS + MOTION + 2] = reading
 
 
+def _transposed(blocks: Sequence[Array], rows: int) -> Array:
+    """The first rows of blocks (BLOCK, k) one after the other, as columns (k, rows)."""
+    result = np.empty((_WIDTH, rows))
+    for i, block in enumerate(blocks):
+        part = result[:, i * BLOCK : (i + 1) * BLOCK]
+        part[:] = block[: part.shape[1]].T
+    return result
+
+
 def _stacked(arrays: Sequence[Array]) -> Array:
-    """Arrays of one shape (...) as one, (n, ...)."""
-    joined = bytearray().join(arrays)  # type: ignore[arg-type]  # arrays are buffers, which only newer stubs know
+    """Arrays of one shape (...) as one, (n, ...), not to be written to."""
+    joined = b"".join(arrays)  # type: ignore[arg-type]  # arrays are buffers, which only newer stubs know
     return np.frombuffer(joined).reshape(len(arrays), *arrays[0].shape)
 
 
@@ -179,7 +188,8 @@ class Recorder:
             Row in which it was captured, if that is not this one.
         """
         update = result.update
-        self._frames += (result.roll, result.late, update.degrees, update.nis, update.accepted, *result.lines())
+        found, believed = result.lines()
+        self._frames += (result.roll, result.late, update.degrees, update.nis, update.accepted, found, believed)
         self._lines.append(view.frame.lines)
         self._true_ends.append(view.true_ends)
         self._seen_ends.append(view.seen_ends)
@@ -204,11 +214,16 @@ class Recorder:
 
     def table(self) -> dict[str, Array]:
         """The log: a column for each of `landsim.log.COLUMNS`."""
-        log = {column.name: np.full(self._count, np.nan) for column in COLUMNS}
-        if self._count == 0:
-            return log
+        log = self._columns() if self._count > 0 else {}
+        return {
+            column.name: log[column.name] if column.name in log else np.full(self._count, np.nan) for column in COLUMNS
+        }
+
+    def _columns(self) -> dict[str, Array]:
+        """Those columns for which there is something."""
+        log: dict[str, Array] = {}
         self._drop_frame_without_step()
-        step = _named(np.concatenate(self._blocks)[: self._count].T.copy(), STEP)
+        step = _named(_transposed(self._blocks, self._count), STEP)
         true, fused = _body(step["motion"]), _body(step["nominal"])
         pitot, tilt, reading = step["pitot"], step["tilt"], step["reading"]
         commands = _columns(len(self._command_rows), self._commands)
@@ -279,20 +294,35 @@ class Recorder:
         frame = _named(_columns(at.size, self._frames), FRAME)
         measured = frame["nis_dof"] > 0.0
         for name in ("nis_dof", "nis", "accepted"):
-            log[name][update[measured]] = frame[name][measured]
-        counts = np.diff(np.append(update, self._count))
-        for name in ("lines_found", "lines_believed"):
-            log[name][update[0] :] = np.repeat(frame[name], counts)
-        log["fault"][at] = self._faults
+            log[name] = self._between(update[measured], frame[name][measured])
+        log |= self._held(update, {name: frame[name] for name in ("lines_found", "lines_believed")})
+        log["fault"] = self._between(at, self._faults)
         true_ends, seen_ends = _stacked(self._true_ends), _stacked(self._seen_ends)
         for i, line in enumerate(LINES):
             for k, end in enumerate(ENDS):
-                log[f"{line}_true_{end}"][at] = true_ends[:, i, k]
-                log[f"{line}_seen_{end}"][at] = seen_ends[:, i, k]
-        lines = _stacked(self._lines)[:, :, :3]
+                log[f"{line}_true_{end}"] = self._between(at, true_ends[:, i, k])
+                log[f"{line}_seen_{end}"] = self._between(at, seen_ends[:, i, k])
+        lines = _stacked(self._lines)[:, :, :3].copy()
         lines[frame["late"] > 0.0, 1] = np.nan
         for quantity, column in zip(QUANTITIES, self._vision(lines, frame["roll"]), strict=True):
-            log[f"vision_{quantity}"][at] = column
+            log[f"vision_{quantity}"] = self._between(at, column)
+
+    def _between(self, rows: Array, values: Array | Sequence[float]) -> Array:
+        """A column that has these values in these rows, and NaN between them."""
+        column = np.full(self._count, np.nan)
+        column[rows] = values
+        return column
+
+    def _held(self, rows: Array, columns: dict[str, Array]) -> dict[str, Array]:
+        """Columns whose values hold from these rows to the next of them; NaN before the first."""
+        first = rows[0]
+        source = np.repeat(np.arange(len(rows)), np.diff(np.append(rows, self._count)))
+        result = {}
+        for name, values in columns.items():
+            column = result[name] = np.empty(self._count)
+            column[:first] = np.nan
+            np.take(values, source, out=column[first:])
+        return result
 
     def _vision(self, lines: Array, roll: Array) -> Array:
         """The poses (6, n) that each frame's lines (n, 3, 3) give by themselves, late with the roll as predicted."""
@@ -308,14 +338,14 @@ class Recorder:
 
     def _calibration_columns(self, log: dict[str, Array]) -> None:
         """The camera's calibration as estimated; it holds from frame to frame."""
-        at = self._calibration_rows
-        counts = np.diff(np.append(at, self._count))
         estimate = _stacked(self._calibration)
         deviation = np.sqrt(np.diagonal(_stacked(self._augmented), axis1=1, axis2=2)[:, STATES:AUGMENTED])
+        columns = {}
         for i, name in enumerate(CALIBRATION):
             unit = DEG if name.endswith("_deg") else 1.0
-            for kind, values in (("fused", estimate), ("sigma", deviation)):
-                log[f"{kind}_{name}"][at[0] :] = np.repeat(values[:, i] / unit, counts)
+            columns[f"fused_{name}"] = estimate[:, i] / unit
+            columns[f"sigma_{name}"] = deviation[:, i] / unit
+        log |= self._held(np.array(self._calibration_rows), columns)
 
     def _filter_columns(self, log: dict[str, Array], true: Body, fused: Body, reading: Array) -> None:
         """The filter's sigmas, biases and normalised errors; sigmas and biases hold from frame to frame."""
@@ -336,32 +366,30 @@ class Recorder:
         without = bool(np.isnan(covariance[:, WITHOUT_BIASES:, WITHOUT_BIASES:]).all())
         if without:  # a plug-in's, which does not estimate biases
             k = WITHOUT_BIASES
-            log["nees9"][at], _ = normalised_squares(error[:, :k], covariance[:, :k, :k], k)
+            nine, _ = normalised_squares(error[:, :k], covariance[:, :k, :k], k)
         else:
-            log["nees9"][at], log["nees15"][at] = normalised_squares(error, covariance, WITHOUT_BIASES)
-        counts = np.diff(np.append(at, self._count))
-
-        def held(name: str, values: Array) -> None:
-            log[name][at[0] :] = np.repeat(values, counts)
-
+            nine, fifteen = normalised_squares(error, covariance, WITHOUT_BIASES)
+            log["nees15"] = self._between(at, fifteen)
+        log["nees9"] = self._between(at, nine)
         known = np.nan_to_num(covariance) if without else covariance
         if self._augmented and len(self._augmented) == at.size:
             known = _stacked(self._augmented)
         sigma = camera_sigma(known, fused.attitude[at], self._mount, reading[at])
         sigma[:, 3:] /= DEG
-        for i, quantity in enumerate(QUANTITIES):
-            held(f"sigma_{quantity}", sigma[:, i])
+        columns = {f"sigma_{quantity}": sigma[:, i] for i, quantity in enumerate(QUANTITIES)}
+        deviation = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+        gyro, accel = imu_error[:, :3] / DEG_PER_HOUR, imu_error[:, 3:]
+        for i, axis in enumerate(AXES):
+            columns[f"sigma_velocity_{axis}_mps"] = deviation[:, 3 + i]
+            columns[f"true_gyro_bias_{axis}_deg_h"] = gyro[:, i]
+            columns[f"fused_gyro_bias_{axis}_deg_h"] = bias[:, i] / DEG_PER_HOUR
+            columns[f"sigma_gyro_bias_{axis}_deg_h"] = deviation[:, GYRO_BIAS.start + i] / DEG_PER_HOUR
+            columns[f"true_accel_bias_{axis}_mps2"] = accel[:, i]
+            columns[f"fused_accel_bias_{axis}_mps2"] = bias[:, 3 + i]
+            columns[f"sigma_accel_bias_{axis}_mps2"] = deviation[:, ACCEL_BIAS.start + i]
+        log |= self._held(at, columns)
         if self._augmented:
             self._calibration_columns(log)
-        deviation = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
-        for i, axis in enumerate(AXES):
-            held(f"sigma_velocity_{axis}_mps", deviation[:, 3 + i])
-            held(f"true_gyro_bias_{axis}_deg_h", imu_error[:, i] / DEG_PER_HOUR)
-            held(f"fused_gyro_bias_{axis}_deg_h", bias[:, i] / DEG_PER_HOUR)
-            held(f"sigma_gyro_bias_{axis}_deg_h", deviation[:, GYRO_BIAS.start + i] / DEG_PER_HOUR)
-            held(f"true_accel_bias_{axis}_mps2", imu_error[:, 3 + i])
-            held(f"fused_accel_bias_{axis}_mps2", bias[:, 3 + i])
-            held(f"sigma_accel_bias_{axis}_mps2", deviation[:, ACCEL_BIAS.start + i])
 
 
 def euler_deg(attitude: Array) -> tuple[Array, Array, Array]:
@@ -420,15 +448,16 @@ def normalised_squares(error: Array, covariance: Array, leading: int) -> tuple[A
         NaN where a covariance is not positive definite.
     """
     n, k = error.shape
-    root, solved = np.zeros((k, k)), np.empty(k)
+    root, solved, deviation = np.zeros((k, k)), np.empty(k), np.empty(k)
     first, every = np.full(n, np.nan), np.full(n, np.nan)
     for row in range(n):
         P, total, partial = covariance[row], 0.0, 0.0
         for i in range(k):
-            solved[i] = error[row, i] / np.sqrt(P[i, i])
+            deviation[i] = np.sqrt(P[i, i])
+            solved[i] = error[row, i] / deviation[i]
             for j in range(i + 1):
                 # in units of the standard deviations: metres beside rad/s would cost ten digits
-                rest = P[i, j] / (np.sqrt(P[i, i]) * np.sqrt(P[j, j]))
+                rest = P[i, j] / (deviation[i] * deviation[j])
                 for m in range(j):
                     rest -= root[i, m] * root[j, m]
                 root[i, j] = rest / root[j, j] if j < i else np.sqrt(rest)

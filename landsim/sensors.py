@@ -273,7 +273,8 @@ class Pitot:
     def sample(self, truth: Truth) -> float:
         """Airspeed, m/s."""
         self._lagged += self._gain * (truth.airspeed - self._lagged)
-        return max(self._scale * self._lagged + next(self._noise), 0.0)
+        reading = self._scale * self._lagged + next(self._noise)
+        return reading if not reading < 0.0 else 0.0
 
 
 class TiltMount:

@@ -225,7 +225,8 @@ def _fly(
                 x, y, z, _, side, _ = sample.tolist()
                 rate, side_force = (x / imu_dt, y / imu_dt, z / imu_dt), side / imu_dt
         tilt_reading = mount.read()
-        if step % frame_every == 0:
+        frame_due = step % frame_every == 0
+        if frame_due:
             view = camera.view(truth, mount.tilt, tilt_reading, rate)
             if lag == 0:
                 result = navigator.observe(view.frame)
@@ -238,7 +239,7 @@ def _fly(
             result = navigator.observe(view.frame)
             recorder.frame(view, result, navigator.known, imu, row)
             diverged = navigator.diverged
-        if step % frame_every == 0:
+        if frame_due:
             if omniscient:
                 nav = true_state(truth, before, dt, navigator.airspeed, side_force)
             else:
@@ -247,7 +248,7 @@ def _fly(
             recorder.command(command, phase, navigator.stage, nav)
             plant.command(command)
         recorder.step(truth, navigator, airspeed, mount.tilt, tilt_reading)
-        if phase is Phase.GO_AROUND:
+        if phase is _GO_AROUND:
             if -truth.motion.item(2) >= climbed and truth.motion.item(5) < 0.0:
                 return End("go_around", guidance.reason)
         elif diverged is not None and not omniscient:
@@ -258,7 +259,7 @@ def _fly(
             mains_down = mains_down or truth.wow_left or truth.wow_right
             if truth.time > faulty + AFTERMATH:
                 return End("fault")
-            if mains_down and settings.end == "touchdown" and faulty == math.inf and phase is not Phase.GO_AROUND:
+            if mains_down and settings.end == "touchdown" and faulty == math.inf and phase is not _GO_AROUND:
                 return End("touchdown")
         standing = standing + dt if truth.wow_left and stands(truth) else 0.0
         if standing > STANDSTILL_TIME:
@@ -274,6 +275,7 @@ def _fly(
 
 
 _ZERO = (0.0, 0.0, 0.0)
+_GO_AROUND = Phase.GO_AROUND  # a member looked up in its class costs as much as a call
 
 
 def _fault_time(truth: Truth, runway: Runway, wheels: Vec3, mains_down: bool) -> float:

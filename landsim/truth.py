@@ -40,12 +40,12 @@ NOMINAL = Loading()
 MOTION = 15
 """Numbers of position, velocity and attitude, as `estimator.strapdown.Inertial.numbers` begins."""
 AFTER_MOTION = (
-    "time", "airspeed", "elevator", "aileron", "rudder", "throttle", "thrust", "wow_nose", "wow_left", "wow_right",
+    "time", "airspeed", "elevator", "aileron", "rudder", "throttle", "wow_nose", "wow_left", "wow_right",
     "wind_x", "wind_y", "wind_z",
 )  # fmt: skip
 """The single numbers that follow."""
 NUMBERS = MOTION + len(AFTER_MOTION)
-_TIME, _AIRSPEED, _ELEVATOR, _AILERON, _RUDDER, _THROTTLE, _THRUST = range(MOTION, MOTION + 7)
+_TIME, _AIRSPEED, _ELEVATOR, _AILERON, _RUDDER, _THROTTLE = range(MOTION, MOTION + 6)
 
 
 class Truth(NamedTuple):
@@ -54,7 +54,7 @@ class Truth(NamedTuple):
     time: float
     """s since the start."""
     motion: Array
-    """(28,): position, velocity and attitude, and what `AFTER_MOTION` names; never written to.
+    """(27,): position, velocity and attitude, and what `AFTER_MOTION` names; never written to.
 
     They are those of the body's origin, which is the centre of gravity of the aircraft as it is nominally loaded.
     """
@@ -86,11 +86,6 @@ class Truth(NamedTuple):
     def throttle(self) -> float:
         """0 to 1."""
         return self.motion.item(_THROTTLE)
-
-    @property
-    def thrust(self) -> float:
-        """N."""
-        return self.motion.item(_THRUST)
 
     @property
     def position(self) -> Vec3:

@@ -112,3 +112,20 @@ def test_incidence_follows_the_trim_table() -> None:
     assert isinstance(incidence, Incidence)
     assert math.degrees(incidence.at(40.0)) == pytest.approx(2.72, abs=0.05)
     assert math.degrees(incidence.at(36.0)) == pytest.approx(4.6, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "told"),
+    [
+        (lambda running: running._ekf.P.__setitem__((1, 1), -1e-9), "a variance of it is negative"),
+        (lambda running: running._ekf.P.__setitem__((2, 2), math.nan), "its position is not finite"),
+        (lambda running: running.nominal.__setitem__(0, math.inf), "its position is not finite"),
+        (lambda running: running._ekf.P.__setitem__((0, 0), 1e6), "its position sigma is"),
+    ],
+)
+def test_a_filter_whose_numbers_cannot_be_is_not_believed(spoil: Any, told: str) -> None:
+    state = Inertial((-900.0, 0.0, -50.0), (40.0, 0.0, 2.0), IDENTITY)
+    navigator = navigator_of(NavigationConfig(), Start(state, np.eye(15)))
+    assert navigator.diverged is None
+    spoil(navigator.filter)
+    assert told in str(navigator.diverged)

@@ -93,7 +93,7 @@ def test_it_starts_where_it_is_told(runway: Runway, initial: InitialState) -> No
     assert yaw == pytest.approx(track, abs=0.01 * DEG)
     assert pitch == pytest.approx(climb + plant.trim.alpha, abs=0.02 * DEG)
     assert plant.trim.elevator == truth.elevator
-    assert plant.trim.thrust == truth.thrust
+    assert plant.trim.throttle == truth.throttle
 
 
 def test_left_alone_it_stays_in_trim() -> None:

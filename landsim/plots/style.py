@@ -110,7 +110,7 @@ def failure(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -> Failure 
     if touchdown is not None:
         if touchdown.sink_rate > aircraft.gear.sink_limit_mps:
             found.append(Failure(touchdown.row, "crash", False))
-        x, y = (values[touchdown.row :] for values in main_wheels(log, aircraft))
+        x, y = main_wheels(log, aircraft, slice(touchdown.row, None))
         off = np.flatnonzero((x < 0.0) | (x > runway.length_m) | (np.abs(y) > 0.5 * runway.width_m))
         if off.size:
             found.append(Failure(touchdown.row + int(off[0]), "off the runway", True))
