@@ -314,6 +314,19 @@ def test_a_rejected_frame_is_told_by_what_was_seen(flight: dict[str, Array]) -> 
     assert titles == ["three lines, rejected"] * 4 + ["two lines, rejected"] * 2
 
 
+def test_a_wrong_line_is_not_called_painted(flight: dict[str, Array]) -> None:
+    taken = (flight["true_along_m"] > -560.0) & (flight["true_along_m"] < -500.0)
+    log = flight | {"fault": np.where(taken, 3.0, 0.0)}
+    figure = plots.camera_views(log, SCENARIO, measured(log))
+    titles = [axes.get_title(loc="left") for axes in figure.axes if "px" in axes.get_xlabel()]
+    (during,) = [title for title in titles if title.startswith("a line is wrong: ")]
+    assert "\nthree lines, right wrong\n5" in during  # some 530 m before
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names[-1] == "another line"
+    assert len(set(names)) == len(names)
+    assert "another line" not in text_of(plots.camera_views(flight, SCENARIO, measured(flight)))
+
+
 def test_offsets_have_one_scale(flight: dict[str, Array]) -> None:
     figure = plots.camera_views(flight, SCENARIO, measured(flight))
     assert len({axes.get_ylim() for axes in figure.axes if "px" not in axes.get_xlabel()}) == 1

@@ -64,6 +64,7 @@ def camera_views(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -> Fig
     offsets = [_offsets(log, row) for _, row in moments]
     worst = max([0.5, *(float(np.abs(y).max()) for lines in offsets for _, y in lines.values())])
     blocks = figure.add_gridspec(2, 3, left=0.07, right=0.985, top=0.85, bottom=0.035, hspace=0.26, wspace=0.24)
+    named: dict[str, Any] = {}
     for i, (name, row) in enumerate(moments):
         column = i % 3
         block = blocks[i // 3, column].subgridspec(2, 1, hspace=0.38, height_ratios=(2.5, 1.0))
@@ -76,17 +77,22 @@ def camera_views(log: Log, scenario: "Scenario", metrics: dict[str, Any]) -> Fig
             residual.set_ylabel("offset, px")
         for axes in (image, residual):
             axes.yaxis.set_label_coords(-0.17, 0.5)
-        if i == 0:
-            handles, labels = image.get_legend_handles_labels()
-            more, names = residual.get_legend_handles_labels()
-            legend_in_head(figure, handles + more, labels + names, markerscale=1.0)
+        for drawn in (image, residual):
+            named |= {label: handle for handle, label in zip(*drawn.get_legend_handles_labels(), strict=True)}
+    legend_in_head(figure, list(named.values()), list(named), markerscale=1.0)
     return figure
 
 
 def _seen(log: Log, row: int) -> str:
-    """How many lines were seen, and whether the filter refused them."""
+    """How many lines were seen, which of them is another one, and whether the filter refused them."""
     count = sum(bool(seen[row]) for seen in lines_seen(log).values())
-    return COUNTS[count] + (", rejected" if log["accepted"][row] == 0.0 else "")
+    wrong = [f", {line} wrong" for i, line in enumerate(LINES) if _is_wrong(log, i, row)]
+    return "".join((COUNTS[count], *wrong, ", rejected" if log["accepted"][row] == 0.0 else ""))
+
+
+def _is_wrong(log: Log, line: int, row: int) -> bool:
+    """Whether what stands for a line is another one: at fault, and seen for all that."""
+    return log["fault"][row] == line + 1 and bool(np.isfinite(_ends(log, LINES[line], "seen", row)).all())
 
 
 def _where(log: Log, row: int) -> str:
@@ -102,6 +108,9 @@ def _moments(log: Log, metrics: dict[str, Any]) -> list[tuple[str, int]]:
     along, time, wheels = log["true_along_m"][frames], log["time_s"][frames], log["wheel_height_m"][frames]
     touched = math.inf if metrics["touchdown"] is None else metrics["touchdown"]["time_s"]
     wanted = [("first lines", int(frames[0]))]
+    wrong = [row for row in frames.tolist() if any(_is_wrong(log, i, row) for i in range(len(LINES)))]
+    if wrong:
+        wanted.append(("a line is wrong", wrong[len(wrong) // 2]))
     for distance in (600.0, 200.0):
         nearest = int(np.argmin(np.abs(along + distance)))
         if abs(along[nearest] + distance) <= NEAR:
@@ -170,16 +179,17 @@ def _image(axes: Axes, log: Log, row: int, scenario: "Scenario") -> None:
 
 
 def _draw_lines(axes: Axes, log: Log, row: int) -> None:
-    """Painted and measured lines, over the frame's edge too: they end there."""
+    """Painted lines, one that stands for one of them, and measured ones, over the frame's edge too: they end there."""
     for i, line in enumerate(LINES):
         true, seen = _ends(log, line, "true", row), _ends(log, line, "seen", row)
+        wrong = _is_wrong(log, i, row)
         axes.plot(
-            *true.T, color=PALE, lw=4.0, solid_capstyle="butt", clip_on=False, zorder=2.6,
-            label="painted line" if i == 0 else None,
+            *true.T, color=PALE, lw=4.0, ls=(0, (0.7, 0.5)) if wrong else "-", solid_capstyle="butt", clip_on=False,
+            zorder=2.6, label="another line" if wrong else "painted line",
         )  # fmt: skip
         axes.plot(
             *seen.T, color=BLACK, lw=1.0, ls=(0, (4, 2)), marker=".", ms=4.0, clip_on=False, zorder=2.7,
-            label="measured" if i == 0 else None,
+            label="measured",
         )  # fmt: skip
 
 
