@@ -59,16 +59,20 @@ def imu_noise(config: ImuConfig) -> ImuNoise:
     """The inertial unit's data sheet in SI, as the filter takes it.
 
     A scale factor acts on gravity and so passes for an accelerometer bias: its share is added to the bias' sigma.  So
-    is that of the bias' flicker, which over a flight drifts as a random walk does whose Allan deviation meets its floor
-    at `FLICKER_DRIFT_S`.
+    is that of the bias' flicker.  What flicker does meanwhile is taken for white noise and a random walk of the bias
+    besides, whose Allan variance together is least at `FLICKER_LEAST_S`: `FLICKER_SHARE` of flicker's.
     """
     drift = 1.0 / math.sqrt(HOUR)
     gyro_flicker = config.gyro_bias_instability_deg_h * DEG_PER_HOUR
     accel_flicker = config.accel_bias_instability_mg * MILLI_G
     if gyro_flicker > 0.0 or accel_flicker > 0.0:
-        walk = FLOOR * math.sqrt(3.0 / FLICKER_DRIFT_S)
+        # N²/τ + K² τ/3 is least where both are half of it
+        least = FLICKER_SHARE * FLOOR**2
+        white, walk = math.sqrt(0.5 * least * FLICKER_LEAST_S), math.sqrt(1.5 * least / FLICKER_LEAST_S)
         plain = imu_noise(config.model_copy(update=dict.fromkeys(_INSTABILITIES, 0.0)))
         return plain._replace(
+            gyro=math.hypot(plain.gyro, white * gyro_flicker),
+            accel=math.hypot(plain.accel, white * accel_flicker),
             gyro_drift=math.hypot(plain.gyro_drift, walk * gyro_flicker),
             accel_drift=math.hypot(plain.accel_drift, walk * accel_flicker),
             gyro_bias=math.hypot(plain.gyro_bias, flicker_sigma(gyro_flicker)),
@@ -88,9 +92,10 @@ def imu_noise(config: ImuConfig) -> ImuNoise:
 _INSTABILITIES = ("gyro_bias_instability_deg_h", "accel_bias_instability_mg")
 FLICKER_TIMES = 0.1 * 4.0 ** np.arange(9)
 """Correlation times of the processes that make up flicker noise, s: from a tenth of a second to two hours."""
-FLICKER_DRIFT_S = 7.0
-"""What a filter then says of angle, place and velocity is right to a tenth of their σ on a flight of a minute, whatever
-the grade; a longer time makes it trust the unit too much, a shorter one too little."""
+FLICKER_LEAST_S = 5.0
+FLICKER_SHARE = 0.7
+"""With these two what a filter says of angle, place and velocity is right to 5 % of their σ on a flight of a minute,
+whatever the grade: the least squares of what `tests/test_imu_errors.py` works out from the covariances."""
 
 
 def flicker_sigma(instability: float) -> float:
