@@ -5,7 +5,9 @@ where the inertial unit has scale factors those of its six axes, each with the s
 One that is known exactly has none and stays what it is.
 """
 
-from typing import NamedTuple
+import functools
+import operator
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -15,7 +17,7 @@ from estimator.compiled import compiled
 from estimator.fusion import NO_UPDATE, Gates, InertialVisionFilter, Update, taken_in
 from estimator.innovation import Eye, Innovation
 from estimator.mount import Mount
-from estimator.single_lines import AUGMENTED, CONSTANTS, LINES, lines_innovation
+from estimator.single_lines import ALL, AUGMENTED, CONSTANTS, LINES, lines_innovation
 from estimator.so3 import Array
 from estimator.strapdown import ACCEL_BIAS, AXES, POSITION, STATES, ImuNoise, Site, predicted_with_constants
 
@@ -28,7 +30,10 @@ time without any they may lie so far off that the first linearisation makes a fi
 ITERATIONS = 8
 SETTLED = 0.01
 """Change of the position, m, at which that is over."""
-_OPEN = np.full(LINES, np.inf)
+Measured: TypeAlias = tuple[Array, Array, Array, int, int, float]
+"""As `estimator.single_lines.lines_innovation` gives it."""
+_OPEN, _CLOSED = np.full(LINES, np.inf), np.full(LINES, -1.0)
+"""Gates that every line passes, and none."""
 
 
 def with_constants(start: Start, calibration: Array, noise: ImuNoise, gravity: float) -> Start:
@@ -158,18 +163,21 @@ class LineVisionFilter(InertialVisionFilter):
         result: Array = self._ekf.P
         return result
 
-    def _innovation(
-        self, lines: Array, extent: Array, tilt: float, gates: Array, point: Array
-    ) -> tuple[Array, Array, Array, int, int, float]:
+    def _innovation(self, lines: Array, extent: Array, tilt: float, gates: Array, point: Array) -> Measured:
         """As `lines_innovation`, of this filter's state."""
         P = self._ekf.P
         return lines_innovation(self._eye, lines, extent, self.nominal, self.calibration, tilt, P, gates, point)
 
-    def _most_likely(self, lines: Array, extent: Array, tilt: float) -> Array | None:
-        """Errors (n,) of the predicted state that agree best with it and with all lines, by Gauss and Newton.
+    def _where_led(self, lines: Array, extent: Array, tilt: float, which: int) -> Measured | None:
+        """The measurement of some lines, given as bits, at the state that agrees best with it and with them.
 
-        None where the iteration does not settle: the lines then say nothing that a covariance could hold.
+        That state is found by Gauss and Newton.  None where this does not settle: the lines then say nothing that a
+        covariance could hold.
         """
+        lines = lines.copy()
+        for line in range(LINES):
+            if not which & (1 << line):
+                lines[line] = np.nan
         point: Array = self._zero
         P = self._ekf.P
         for _ in range(ITERATIONS):
@@ -177,8 +185,28 @@ class LineVisionFilter(InertialVisionFilter):
             PH = P @ H.T
             before, point = point, PH @ np.linalg.solve(H @ PH + R, y)
             if np.abs(point[POSITION] - before[POSITION]).max() < SETTLED:
-                return point
+                return self._innovation(lines, extent, tilt, self._line_gates, point)
         return None
+
+    def _from_afar(self, lines: Array, extent: Array, tilt: float, found: int) -> Measured:
+        """The measurement of lines that may lie far off, linearised where they lead to.
+
+        All of them are believed if they agree.  Of three, two are if they are the only two that do; the line that two
+        agreeing pairs have in common is if there are more.
+        """
+        measured = self._where_led(lines, extent, tilt, found)
+        if measured is not None and measured[4] == found:
+            return measured
+        if measured is not None and found == ALL:
+            pairs = [ALL & ~(1 << line) for line in range(LINES)]
+            led = {pair: self._where_led(lines, extent, tilt, pair) for pair in pairs}
+            agreeing = [pair for pair, told in led.items() if told is not None and told[4] == pair]
+            common = functools.reduce(operator.and_, agreeing, ALL)
+            if agreeing and common:
+                measured = led[common] if common in led else self._where_led(lines, extent, tilt, common)
+                if measured is not None and measured[4] == common:
+                    return measured
+        return self._innovation(lines, extent, tilt, _CLOSED, self._zero)
 
     def observe_lines(self, lines: Array, extent: Array, tilt: float) -> LinesUpdate:
         """Correct the state by those of a frame's lines that agree with it.  `predict` comes first.
@@ -195,13 +223,7 @@ class LineVisionFilter(InertialVisionFilter):
         ekf = self._ekf
         y, H, R, found, believed, nis = self._innovation(lines, extent, tilt, self._line_gates, self._zero)
         if found and max(ekf.P[1, 1], ekf.P[2, 2]) > FAR**2:
-            point = self._most_likely(lines, extent, tilt)
-            if point is None:
-                believed = 0
-            else:
-                again = self._innovation(lines, extent, tilt, self._line_gates, point)
-                if again[4].bit_count() >= believed.bit_count():
-                    y, H, R, found, believed, nis = again
+            y, H, R, _, believed, nis = self._from_afar(lines, extent, tilt, found)
         if believed == 0:
             return LinesUpdate(Update(2 * found.bit_count(), nis, False) if found else NO_UPDATE, found, 0)
         self._correct(Innovation(y, H, R))

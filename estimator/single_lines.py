@@ -212,7 +212,8 @@ def believed_lines(d: Array, S: Array, gates: Array) -> tuple[int, int, float]:
     """Which of a frame's lines agree with the prediction, and with each other.
 
     A line that by itself is past the gate of two numbers is left out.  If those that remain are past theirs together,
-    the one without which they agree best is left out too, if they then agree; if not, none is believed.
+    the one without which the others agree is left out too.  Where there are several of that kind it is not known which
+    of them is wrong, and none of them is believed; nor is any line where there is none of that kind.
 
     Parameters
     ----------
@@ -241,17 +242,17 @@ def believed_lines(d: Array, S: Array, gates: Array) -> tuple[int, int, float]:
     together = _normalised(_rows(good), d, S)
     if together <= gates[len(_rows(good)) // 2 - 1]:
         return found, good, together
-    best, least = 0, np.inf
-    for line in range(3):
-        rest = good & ~(1 << line)
-        if rest not in (good, 0):
-            square = _normalised(_rows(rest), d, S)
-            if square <= gates[len(_rows(rest)) // 2 - 1] and square < least:
-                best, least = rest, square
-    # of two lines that disagree neither is known to be the right one
-    if len(_rows(good)) < 6 or best == 0:
-        return found, 0, together
-    return found, best, least
+    # of two lines that disagree neither is known to be the right one; of three that without which the others agree
+    certain, none = good, True
+    if len(_rows(good)) == 6:
+        for line in range(3):
+            rest = good & ~(1 << line)
+            if _normalised(_rows(rest), d, S) <= gates[1]:
+                certain &= rest
+                none = False
+    if none or certain == 0:
+        return found, 0, _normalised(_rows(found), d, S)
+    return found, certain, _normalised(_rows(certain), d, S)
 
 
 @compiled

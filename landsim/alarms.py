@@ -51,7 +51,7 @@ def integrity(
     dict
         None for what there is not.
 
-        ``lateral``, ``vertical``   of the frames in approach and flare for which guidance was given a protection level:
+        ``lateral``, ``vertical``   of the frames in the air for which guidance was given a protection level:
                                     ``frames``, ``exceeded_frames`` in which the error was greater, their ``share``;
                                     ``protection_max_m`` and ``protection_last_m`` of the level itself
         ``misleading_frames``       in which either error was greater while no alarm stood
@@ -70,7 +70,7 @@ def integrity(
     alarm = np.nan_to_num(log["alarm"]).astype(int)
     # guidance is called at captures, which are the rows that say whether there was a fault
     frame = judged & np.isfinite(log["fault"])
-    flying = (log["phase"] == Phase.APPROACH) | (log["phase"] == Phase.FLARE)
+    flying = judged & (log["phase"] != Phase.ACQUIRE)  # whatever navigation takes itself for
     landing = frame & flying
     exceeded = np.zeros(rows.size, dtype=bool)
     result: dict[str, Any] = {}

@@ -111,10 +111,19 @@ class ImperfectCamera:
         Of the points' noise.
     chance : Generator
         Of dropped frames, and of which line is at fault.
+    believed_px : float
+        1 σ of a point as navigation takes it, px: blur and lost contrast are reported relative to it.
     """
 
     def __init__(
-        self, config: CameraConfig, fault: FaultConfig, lever: Vec3, runway: Runway, rng: Generator, chance: Generator
+        self,
+        config: CameraConfig,
+        fault: FaultConfig,
+        lever: Vec3,
+        runway: Runway,
+        rng: Generator,
+        chance: Generator,
+        believed_px: float,
     ) -> None:
         camera = self.camera = camera_of(config)
         fx, fy, cx, cy = camera.intrinsics
@@ -135,8 +144,8 @@ class ImperfectCamera:
                 config.radial_distortion,
                 config.exposure_s,
                 config.visibility_m,
-                config.noise_px,
-                config.noise_factor,
+                believed_px,
+                config.noise_factor * config.noise_px,
                 spacing_of(config.line_noise, config.point_spacing_px),
             )
         )
@@ -227,7 +236,7 @@ def _imaged(
     """Readings (3, 7), true and seen ends (3, 4) of the lines, as `View` has them.
 
     `setup` is intrinsics, width and height, near plane, shortest line, lever arm, pan and roll (rad), distortion,
-    exposure (s), visibility (m), noise as believed (px), its factor, spacing of points (px).
+    exposure (s), visibility (m), noise as believed and as it is (px), spacing of points (px).
     """
     readings, ends, seen = np.full((3, 7), np.nan), np.full((3, 4), np.nan), np.full((3, 4), np.nan)
     camera = Intrinsics(setup[0], setup[1], setup[2], setup[3])
@@ -274,8 +283,8 @@ def _imaged(
         distance = depth * math.sqrt(ray[0] * ray[0] + ray[1] * ray[1] + 1.0)
         contrast = max(math.exp(-CONTRAST_DECAY * distance / visibility), ALL_GONE)
         blur = smear * smear / 12.0
-        sigma = math.sqrt((setup[17] * believed / contrast) ** 2 + blur)
-        worse = 1.0 / (contrast * contrast) + (blur / (believed * believed) if believed > 0.0 else 0.0)
+        sigma = math.sqrt((setup[17] / contrast) ** 2 + blur)
+        worse = 1.0 / (contrast * contrast) + blur / (believed * believed)
         if length < setup[7] * math.sqrt(worse):  # no line stands out of so much noise
             continue
         number = max(2, int(length / spacing) + 1)
@@ -353,9 +362,15 @@ def _share(start: Vec3, end: Vec3, ray: Vec3) -> float:
 
 
 def line_camera(
-    config: CameraConfig, fault: FaultConfig, lever: Vec3, runway: Runway, rng: Generator, chance: Generator
+    config: CameraConfig,
+    fault: FaultConfig,
+    lever: Vec3,
+    runway: Runway,
+    rng: Generator,
+    chance: Generator,
+    believed_px: float,
 ) -> LineCamera | ImperfectCamera:
     """The camera of a scenario: the plain one where it has none of the errors of this module."""
     if is_perfect(config, fault):
         return LineCamera(config, lever, runway, rng)
-    return ImperfectCamera(config, fault, lever, runway, rng, chance)
+    return ImperfectCamera(config, fault, lever, runway, rng, chance, believed_px)

@@ -139,6 +139,7 @@ def load_scenario(name_or_path: str | Path, overrides: Mapping[str, object] | No
         raise ScenarioError(f"{path}: the path of a scenario must be UTF-8 text")
     overrides = dict(overrides or {})
     table = _read(path)
+    _settle_draws(table, overrides)
     for key, value in overrides.items():
         _override(table, key, value, path)
     settings = _validated(ScenarioFile, table, path, overrides)
@@ -268,6 +269,21 @@ def _override(table: dict[str, Any], key: str, value: object, path: Path) -> Non
             raise ScenarioError(f"{path}: override {key}: {'.'.join(tables[:done])} is not a table")
         table = inner
     table[last] = deepcopy(value)  # later overrides may write into it
+
+
+def _settle_draws(table: dict[str, Any], overrides: Mapping[str, object]) -> None:
+    """Give an overridden key for which the file draws another value a distribution that has the one value.
+
+    It stays among the draws, so that those of the other keys are the same as without the override.
+    """
+    dispersions = table.get("dispersions")
+    draws = dispersions.get("draw") if isinstance(dispersions, dict) else None
+    if not isinstance(draws, list):
+        return
+    for i, draw in enumerate(draws):
+        key = draw.get("key") if isinstance(draw, dict) else None
+        if isinstance(key, str) and key in overrides and draw.get("apply", "replace") == "replace":
+            draws[i] = {"key": key, "distribution": "discrete", "values": [overrides[key]]}
 
 
 def _indexed(part: str) -> tuple[str, int | None]:

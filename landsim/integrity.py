@@ -7,7 +7,10 @@ risk, by its own covariance and the normal distribution.  Faults that the model 
 import math
 from statistics import NormalDist
 
+import numpy as np
+
 from estimator.single_lines import LINES
+from estimator.so3 import Array
 from landsim.state import Alarm
 
 
@@ -16,11 +19,30 @@ def protection_factor(risk: float) -> float:
     return NormalDist().inv_cdf(1.0 - 0.5 * risk)
 
 
+STRAINED = 5.0
+"""Standard deviations from what is believed that no constant is off by: of 1.7 million normal ones a single one is."""
+
+
+def is_strained(calibration: Array, sigma: Array) -> bool:
+    """Whether an estimated constant is further from what was believed of it than it can be.
+
+    Lines that lie wrong together, each frame by too little to be left out, are explained by the camera's calibration
+    or the runway's width, until these are explained by nothing.
+
+    Parameters
+    ----------
+    calibration, sigma : (n,) array
+        The constants as estimated, and their standard deviations before any measurement; zero for one that is known.
+    """
+    return bool((np.abs(calibration) > STRAINED * sigma).any())
+
+
 class LineMonitor:
     """Finds lines that keep disagreeing with all else.
 
     A line is taken for another once it has been left out for ``confirm`` seconds more than it has been believed, and
-    for itself again once it has been believed for as long.
+    for itself again once it has been believed for as long.  Of one that never was believed for ``confirm`` seconds it
+    is not known whether it is the line that is wrong, or the state, by what was believed before.
 
     Parameters
     ----------
@@ -37,9 +59,11 @@ class LineMonitor:
         self._aided = 0.0
         self._against = [0.0] * LINES
         self._wrong = [False] * LINES
+        self._agreed = [0.0] * LINES
         self._disagreed = 0.0
+        self._strained = False
 
-    def take(self, time: float, found: int, believed: int) -> None:
+    def take(self, time: float, found: int, believed: int, *, strained: bool = False) -> None:
         """Take in what became of a frame.
 
         Parameters
@@ -48,7 +72,10 @@ class LineMonitor:
             Of its capture, s.
         found, believed : int
             Lines as bits.
+        strained : bool
+            Whether the calibration had to be `is_strained` for the lines to agree.
         """
+        self._strained = strained
         dt, self._time = max(time - self._time, 0.0), time
         if believed:
             self._aided = time
@@ -56,6 +83,7 @@ class LineMonitor:
             bit = 1 << line
             if found & bit:
                 change = -dt if believed & bit else dt
+                self._agreed[line] = min(self._agreed[line] + max(-change, 0.0), self._confirm)
                 self._against[line] = min(max(self._against[line] + change, 0.0), self._confirm)
             if self._against[line] >= self._confirm:
                 self._wrong[line] = True
@@ -74,6 +102,7 @@ class LineMonitor:
         alarm = Alarm.WRONG_LINE if any(self._wrong) else Alarm.NONE
         if time - self._aided > self._unaided:
             alarm |= Alarm.UNAIDED
-        if self._disagreed >= self._confirm or sum(self._wrong) > 1:
+        strange = any(wrong and agreed < self._confirm for wrong, agreed in zip(self._wrong, self._agreed, strict=True))
+        if strange or self._strained or self._disagreed >= self._confirm or sum(self._wrong) > 1:
             alarm |= Alarm.INCONSISTENT
         return alarm

@@ -44,7 +44,7 @@ from estimator.strapdown import (
 )
 from estimator.three_line import three_line_pose
 from landsim.config import MountConfig, NavigationConfig
-from landsim.integrity import LineMonitor, protection_factor
+from landsim.integrity import LineMonitor, is_strained, protection_factor
 from landsim.state import Alarm, CameraFrame, ImuSample, NavState, Stage
 from landsim.units import DEG, STANDARD_GRAVITY
 
@@ -281,7 +281,8 @@ class Navigator:
         """A frame of which each line counts by itself."""
         assert self._monitor is not None
         update, found, believed = running.observe_lines(lines, _extent(frame.lines), frame.tilt)
-        self._monitor.take(frame.time, found, believed)
+        strained = is_strained(running.calibration, self._calibration)
+        self._monitor.take(frame.time, found, believed, strained=strained)
         if found:
             self._rejected = 0 if believed else self._rejected + 1
         threshold = bool(believed & (1 << THRESHOLD))

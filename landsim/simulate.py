@@ -200,7 +200,8 @@ def _fly(
     pitot = Pitot(scenario.pitot, dt, truth, pitot_rng, plant.density_ratio)
     mount = TiltMount(aircraft.mount, dt, mount_rng, scenario.camera.tilt_error_deg * DEG)
     lever, chance = aircraft.mount.position_body_m, default_rng(seeds[5])
-    camera = line_camera(scenario.camera, scenario.fault, lever, runway, camera_rng, chance)
+    believed_px = max(scenario.camera.noise_px, scenario.navigation.min_noise_px)
+    camera = line_camera(scenario.camera, scenario.fault, lever, runway, camera_rng, chance, believed_px)
     lag = imu_every * round(scenario.camera.latency_s * scenario.imu.rate_hz)
     on_the_way: deque[tuple[int, View, int]] = deque()
     if scenario.navigation.start == "handover":

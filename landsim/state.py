@@ -40,7 +40,7 @@ class Alarm(IntFlag):
     UNAIDED = 2
     """No line has been believed for longer than allowed."""
     INCONSISTENT = 4
-    """So much disagrees that it may be the state that is wrong."""
+    """So much disagrees, or for so long, that it may be the state that is wrong."""
 
 
 ImuSample: TypeAlias = Array

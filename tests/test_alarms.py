@@ -52,7 +52,7 @@ def at(row: int) -> Any:
     return pytest.approx(row * STEP, abs=1e-12)
 
 
-def test_errors_beyond_the_protection_level_are_counted_in_frames_of_approach_and_flare() -> None:
+def test_errors_beyond_the_protection_level_are_counted_in_frames_in_the_air() -> None:
     """Rows 4 to 9 are 1.01 m right, 12 to 14 two metres low, which is not beyond 2 m; on the ground all is off."""
     log = approach(
         fused_cross_m=[(slice(4, 10), 8.01), (slice(DOWN, ROWS), 99.0)],
@@ -68,6 +68,12 @@ def test_errors_beyond_the_protection_level_are_counted_in_frames_of_approach_an
     assert (found["vertical"]["exceeded_frames"], found["vertical"]["protection_max_m"]) == (1, 2.0)
     assert found["misleading_frames"] == 4
     assert (found["flagged"], found["false_alarm"]) == (False, False)
+
+
+def test_navigation_that_believes_itself_down_while_it_flies_counts() -> None:
+    log = approach(phase=[(slice(20, None), float(Phase.ROLLOUT))], fused_cross_m=[(slice(22, None), 9.0)])
+    found = stated(log)
+    assert (found["lateral"]["frames"], found["lateral"]["exceeded_frames"], found["misleading_frames"]) == (15, 4, 4)
 
 
 def test_an_error_that_an_alarm_goes_with_misleads_nobody() -> None:

@@ -43,7 +43,9 @@ CENTRE = (328.5, 246.5)
 def camera(fault: dict[str, Any] | None = None, seed: int = 0, **changes: Any) -> ImperfectCamera:
     config = CameraConfig.model_validate({"noise_px": 0.0, **changes})
     faults = FaultConfig.model_validate(fault or {})
-    return ImperfectCamera(config, faults, LEVER, RUNWAY, default_rng(seed), default_rng(seed + 1000))
+    return ImperfectCamera(
+        config, faults, LEVER, RUNWAY, default_rng(seed), default_rng(seed + 1000), max(config.noise_px, 0.05)
+    )
 
 
 def level(before: float, height: float, **changes: Any) -> Truth:
@@ -192,7 +194,7 @@ def test_without_errors_it_is_the_plain_camera() -> None:
 def test_each_error_takes_the_other_camera(changes: dict[str, Any], fault: dict[str, Any]) -> None:
     config, faults = CameraConfig.model_validate(changes), FaultConfig.model_validate(fault)
     assert not is_perfect(config, faults)
-    made = line_camera(config, faults, LEVER, RUNWAY, default_rng(0), default_rng(1))
+    made = line_camera(config, faults, LEVER, RUNWAY, default_rng(0), default_rng(1), 1.0)
     assert isinstance(made, ImperfectCamera)
 
 
@@ -207,7 +209,7 @@ def test_what_the_plain_camera_and_the_loop_do_themselves_is_no_error_here() -> 
         }
     )
     assert is_perfect(config, FaultConfig())
-    made = line_camera(config, FaultConfig(), LEVER, RUNWAY, default_rng(0), default_rng(1))
+    made = line_camera(config, FaultConfig(), LEVER, RUNWAY, default_rng(0), default_rng(1), 1.0)
     assert isinstance(made, LineCamera)
 
 

@@ -17,7 +17,7 @@ from estimator.so3 import IDENTITY, Array
 from estimator.strapdown import ATTITUDE, POSITION, VELOCITY, Inertial, Site, corrected, inertial
 from landsim.config import CameraConfig, ImuConfig, NavigationConfig, load_aircraft
 from landsim.handover import handed_over
-from landsim.integrity import LineMonitor, protection_factor
+from landsim.integrity import LineMonitor, is_strained, protection_factor
 from landsim.navigation import Navigator
 from landsim.runway import Runway
 from landsim.scene import incidence_of
@@ -155,13 +155,43 @@ def test_a_line_left_out_for_long_enough_is_wrong_until_it_is_believed_as_long()
         monitor, time = monitor_after((30, 7, 7), (count, 7, 5))
         assert monitor.alarm(time) == alarm
     assert monitor.wrong == 2
-    monitor, time = monitor_after((10, 7, 5), (8, 7, 7))
+    monitor, time = monitor_after((30, 7, 7), (10, 7, 5), (8, 7, 7))
     assert monitor.alarm(time) == Alarm.WRONG_LINE
-    monitor, time = monitor_after((10, 7, 5), (10, 7, 7))
+    monitor, time = monitor_after((30, 7, 7), (10, 7, 5), (10, 7, 7))
     assert monitor.alarm(time) == Alarm.NONE
     # one that is not seen says nothing, for or against
-    monitor, time = monitor_after((10, 7, 5), (60, 5, 5))
+    monitor, time = monitor_after((30, 7, 7), (10, 7, 5), (60, 5, 5))
     assert monitor.alarm(time) == Alarm.WRONG_LINE
+
+
+def test_of_a_line_that_never_agreed_it_is_not_known_whether_it_is_the_line_that_is_wrong() -> None:
+    """The right edge first seen when the left one has long been believed, which may be the wrong one of the two."""
+    monitor, time = monitor_after((60, 1, 1), (12, 5, 1))
+    assert monitor.alarm(time) == Alarm.WRONG_LINE | Alarm.INCONSISTENT
+    for count, alarm in ((7, Alarm.WRONG_LINE | Alarm.INCONSISTENT), (11, Alarm.WRONG_LINE)):
+        monitor, time = monitor_after((60, 1, 1), (count, 5, 5), (12, 5, 1))
+        assert monitor.alarm(time) == alarm
+
+
+def test_constants_that_cannot_be_say_that_the_state_may_be_wrong() -> None:
+    sigma = np.array((0.1, 0.0, 2.0))
+    assert not is_strained(np.array((0.49, 0.0, -9.9)), sigma)
+    assert is_strained(np.array((0.0, 0.0, -10.1)), sigma)
+    monitor, time = monitor_after((30, 7, 7))
+    monitor.take(time, 7, 7, strained=True)
+    assert monitor.alarm(time) == Alarm.INCONSISTENT
+    monitor.take(time, 7, 7)
+    assert monitor.alarm(time) == Alarm.NONE
+
+
+def test_edges_that_lie_wrong_from_the_start_strain_the_width() -> None:
+    """Two edges 34 m apart where 30 m are believed, to 0.1 m: the lines agree, each frame, and the alarm stands."""
+    runway = Runway(2000.0, 34.0, 0.0, 0.0, 0.0, 0.0)
+    camera = LineCamera(CameraConfig(noise_px=1.0), (0.0, 0.0, 0.0), runway, default_rng(1))
+    seen = [camera.view(truth_at(step), TILT, TILT).frame for step in range(0, 720, EVERY)]
+    navigator = navigator_of(aiding="lines", width_sigma_m=0.1, handover_along_sigma_m=50.0)
+    flown(navigator, seen, 720)
+    assert navigator.state(6.0).alarm & Alarm.INCONSISTENT
 
 
 def test_no_line_for_long_and_lines_that_all_disagree() -> None:
@@ -204,4 +234,4 @@ def test_a_first_frame_that_comes_late_counts_as_no_time() -> None:
     assert monitor.alarm(9.0) == Alarm.NONE
     for frame in range(1, 11):
         monitor.take(9.0 + frame / 30.0, 7, 5)
-    assert monitor.alarm(9.4) == Alarm.WRONG_LINE
+    assert monitor.alarm(9.4) & Alarm.WRONG_LINE

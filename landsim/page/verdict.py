@@ -111,7 +111,7 @@ def _protection(found: Mapping[str, Any]) -> Table:
     head = ("error", "frames beyond", "of", "share", "interval over flights", "against the risk", "flights with any",
             "95 % interval", "last level, median")  # fmt: skip
     caption = (
-        "Errors of the camera's position beyond the protection level that navigation stated, in approach and flare;"
+        "Errors of the camera's position beyond the protection level that navigation stated, in the air;"
         f" the risk is {percent(found['risk'])}"
     )
     return Table(caption, head, rows, words=frozenset({5}))

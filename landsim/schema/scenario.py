@@ -86,6 +86,10 @@ class ScenarioFile(Section):
         if self.approach.aim_point_m >= self.runway.length_m:
             length, aim_point = self.runway.length_m, self.approach.aim_point_m
             raise refused(f"must be below runway.length_m = {length:g}, not {aim_point:g}", "approach.aim_point_m")
+        late, unaided = self.camera.latency_s, self.navigation.unaided_s
+        if self.navigation.aiding == "lines" and late >= unaided:
+            told = f"must be below navigation.unaided_s = {unaided:g}, or every frame comes too late; not {late:g}"
+            raise refused(told, "camera.latency_s")
         return self
 
     @model_validator(mode="after")

@@ -186,7 +186,24 @@ def test_lines_seen_late_from_far_beside_do_not_make_it_sure_of_a_wrong_place(fr
         errors.append((believed, float(off @ np.linalg.solve(running.covariance[:3, :3], off))))
     assert errors[0][0] == 7
     assert errors[0][1] < chi2.ppf(0.9999, 3)
-    assert errors[1][1] > 10.0 * errors[0][1] or errors[1][0] == 0
+    assert errors[1][1] > 10.0 * errors[0][1] or errors[1][0] != 7
+
+
+@pytest.mark.parametrize("line", [0, 2])
+@pytest.mark.parametrize("across", [-5.0, 5.0])
+def test_a_wrong_edge_seen_from_afar_does_not_make_it_sure_of_a_wrong_place(line: int, across: float) -> None:
+    """390 m before the threshold one edge is that of a road 40 m further out: the truth stays within some sigma."""
+    start, lines, tilt, true = seen_from(300, across)
+    t, k = flight.truth(), 300 * flight.EVERY
+    other = runway_lines(PAPER, flight.camera_pose(t.position[k], t.R[k], tilt), width=WIDTH + 80.0)[line]
+    row = lines[line]
+    off = other[:2] @ row[3:5] + other[2]
+    row[:3], row[3:5] = other, row[3:5] - off * other[:2]
+    running = filter_of(start, np.zeros(CONSTANTS))
+    believed = running.observe_lines(lines, np.zeros(3), tilt).believed
+    off = true - np.array(running.state.position)
+    assert not believed & (1 << line)
+    assert off @ np.linalg.solve(running.covariance[:3, :3], off) < chi2.ppf(0.9999, 3)
 
 
 def test_lines_that_lead_nowhere_are_not_believed() -> None:
