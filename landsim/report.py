@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from landsim.study.model import Envelope
 
 DPI = 150
-PICTURES = ("profile.png", "navigation.png", "controls.png", "camera.png", "consistency.png")
+PICTURES = ("profile.png", "navigation.png", "controls.png", "camera.png", "consistency.png", "integrity.png")
 """What ``draw_run`` writes, in this order."""
 REPORT, COMPARISON = ("report.html", "report.md"), ("compare.html", "compare.md")
 """The page, and the same as Markdown, of a batch and of a comparison."""
@@ -56,6 +56,7 @@ def draw_run(folder: Path, scenario: "Scenario", log: Log, metrics: dict[str, An
         plots.controls_and_attitude,
         plots.camera_views,
         plots.consistency,
+        plots.integrity,
     )
     figures = [picture(log, scenario, metrics) for picture in draw]
     return [_save(figure, folder / name) for figure, name in zip(figures, PICTURES, strict=True)]

@@ -445,6 +445,10 @@ def test_an_edge_is_not_smeared_along_itself() -> None:
     # v = f h / x, so that it moves by f h / x² × 40 m/s, at an axis 3° down nearly so
     smear = 0.02 * F * 12.0 / 150.0**2 * 40.0
     assert blurred.frame.lines[1, 6] == pytest.approx(sharp[1] / (1.0 + smear**2 / 12.0 / 1.5**2), rel=0.02)
+    # without noise of its own it is told by what navigation takes for noise, here 0.05 px
+    device = camera(noise_px=0.0, min_line_px=2.0, pan_error_deg=0.1, exposure_s=0.02)
+    noiseless = device.view(truth, TILT, 0.0, (0.0, 0.0, 0.0)).frame.lines[1, 6]
+    assert noiseless == pytest.approx(sharp[1] / (1.0 + smear**2 / 12.0 / 0.05**2), rel=0.02)
 
 
 def test_a_frame_counts_when_it_arrives_and_shows_what_was_there_before() -> None:

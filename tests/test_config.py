@@ -467,3 +467,10 @@ def test_a_users_file_wins_over_a_shipped_name(tmp_path: Path, monkeypatch: pyte
     assert find_scenario("landing") == shipped_scenarios()["landing"]
     monkeypatch.chdir(tmp_path)
     assert find_scenario("landing") == (tmp_path / "landing").resolve()
+
+
+def test_an_image_that_is_always_too_late_is_refused(tmp_path: Path) -> None:
+    text = MINIMAL + 'navigation.aiding = "lines"\ncamera.latency_s = 2.0\n'
+    told = refusal(tmp_path, text)
+    assert told == "camera.latency_s: must be below navigation.unaided_s = 2, or every frame comes too late; not 2"
+    assert refusal(tmp_path, text.replace("2.0", "1.5"), {"navigation.unaided_s": 1.0}).startswith("camera.latency_s: ")

@@ -317,6 +317,22 @@ def test_rows_have_the_draws_as_columns(monkeypatch: pytest.MonkeyPatch) -> None
     assert {f"draw.{key}": value for key, value in draws_of_seed(scenario, 3).items()} == {n: lost[n] for n in columns}
 
 
+def test_an_override_of_a_drawn_key_wins_and_the_others_are_drawn_as_without_it() -> None:
+    plain = load_scenario("weather")
+    foggy = load_scenario("weather", {"camera.visibility_m": 150.0, "wind.head_mps": 0})
+    for seed in range(3):
+        before, after = draws_of_seed(plain, seed), draws_of_seed(foggy, seed)
+        assert after == before | {"camera.visibility_m": 150.0, "wind.head_mps": 0.0}
+    again = tomllib.loads(resolved_toml(foggy))
+    assert [draw["key"] for draw in again["dispersions"]["draw"]] == list(keys_of(plain))
+
+
+def test_what_multiplies_a_key_multiplies_the_override() -> None:
+    noisy = load_scenario("weather", {"pitot.noise_mps": 2.0 * load_scenario("weather").pitot.noise_mps})
+    plain = draws_of_seed(load_scenario("weather"), 5)["pitot.noise_mps"]
+    assert draws_of_seed(noisy, 5)["pitot.noise_mps"] == pytest.approx(2.0 * plain)
+
+
 def test_the_shipped_dispersions_teach_each_distribution() -> None:
     scenario = load_scenario("dispersed")
     assert scenario.dispersions is not None

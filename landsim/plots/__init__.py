@@ -9,6 +9,7 @@ work on any log, also on an empty one.
 from landsim.plots.camera import camera_views
 from landsim.plots.controls import controls_and_attitude
 from landsim.plots.course import profile_and_plan
+from landsim.plots.integrity import integrity
 from landsim.plots.navigation import consistency, navigation_errors
 
-__all__ = ["camera_views", "consistency", "controls_and_attitude", "navigation_errors", "profile_and_plan"]
+__all__ = ["camera_views", "consistency", "controls_and_attitude", "integrity", "navigation_errors", "profile_and_plan"]

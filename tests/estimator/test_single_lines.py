@@ -167,7 +167,26 @@ def test_lines_that_disagree_with_each_other() -> None:
     third = np.array((10.0, 0.0, -9.0, 0.0, 10.5, 0.0))
     assert believed_lines(third, vague, gates)[:2] == (7, 5)
     two = np.array((10.0, 0.0, np.nan, np.nan, -9.0, 0.0))
-    assert believed_lines(two, vague, gates)[:2] == (5, 0)
+    found, believed, nis = believed_lines(two, vague, gates)
+    assert (found, believed) == (5, 0)
+    assert nis == pytest.approx(two[[0, 1, 4, 5]] @ np.linalg.solve(vague[:4, :4], two[[0, 1, 4, 5]]))
+
+
+def test_of_two_that_could_be_wrong_neither_is_believed() -> None:
+    """Edges that contradict each other, and a threshold that agrees with either."""
+    S = np.eye(6)
+    S[0, 4] = S[4, 0] = 0.9
+    edges = np.array((3.0, 0.0, 0.3, -0.2, -3.0, 0.0))
+    found, believed, nis = believed_lines(edges, S, gates_of(1e-4))
+    assert (found, believed) == (7, 2)
+    assert nis == pytest.approx(0.09 + 0.04)
+
+
+def test_where_none_is_believed_the_square_is_of_all_that_was_found() -> None:
+    d = np.array((100.0, 0.0, 3.5, 3.5, -3.5, -3.5))
+    found, believed, nis = believed_lines(d, np.eye(6), gates_of(1e-4))
+    assert (found, believed) == (7, 0)
+    assert nis == pytest.approx(1e4 + 4.0 * 3.5**2)
 
 
 @pytest.mark.parametrize("probability", [1e-2, 1e-6])
