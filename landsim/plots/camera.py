@@ -40,6 +40,8 @@ NEAR = 10.0
 """A frame within this of a round distance is named after it, m."""
 LOW = 7.0
 """Wheels below this are near the ground, m."""
+ANOTHER = "#eaa47f"
+"""Of a line that stands for a painted one."""
 LINE_STYLES: dict[str, dict[str, Any]] = {
     "left": {"color": BLUE, "lw": 1.3},
     "threshold": {"color": VERMILION, "lw": 1.3, "ls": (0, (4, 2))},
@@ -184,8 +186,8 @@ def _draw_lines(axes: Axes, log: Log, row: int) -> None:
         true, seen = _ends(log, line, "true", row), _ends(log, line, "seen", row)
         wrong = _is_wrong(log, i, row)
         axes.plot(
-            *true.T, color=PALE, lw=4.0, ls=(0, (0.7, 0.5)) if wrong else "-", solid_capstyle="butt", clip_on=False,
-            zorder=2.6, label="another line" if wrong else "painted line",
+            *true.T, color=ANOTHER if wrong else PALE, lw=4.0, ls=(0, (1.2, 0.6)) if wrong else "-",
+            solid_capstyle="butt", clip_on=False, zorder=2.6, label="another line" if wrong else "painted line",
         )  # fmt: skip
         axes.plot(
             *seen.T, color=BLACK, lw=1.0, ls=(0, (4, 2)), marker=".", ms=4.0, clip_on=False, zorder=2.7,
@@ -196,10 +198,13 @@ def _draw_lines(axes: Axes, log: Log, row: int) -> None:
 def _offsets(log: Log, row: int) -> dict[str, tuple[Array, Array]]:
     """Where along a painted line the ends of the measured one are (0 to 1), and how far off it they are, px.
 
-    An edge's offset is to the right, the threshold's down.  A line that was not seen is left out.
+    An edge's offset is to the right, the threshold's down.  A line that was not seen is left out, and so is one for
+    which another was taken.
     """
     result = {}
-    for line in LINES:
+    for i, line in enumerate(LINES):
+        if _is_wrong(log, i, row):
+            continue
         true, seen = _ends(log, line, "true", row), _ends(log, line, "seen", row)
         length = float(np.hypot(*(true[1] - true[0])))
         if not (np.isfinite(seen).all() and length > 0.0):
