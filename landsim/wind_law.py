@@ -63,7 +63,7 @@ class WindMemory(NamedTuple):
     head: float = 0.0
     """Wind against the landing direction, low-passed, m/s."""
     cross: float = 0.0
-    """Towards the right, m/s; it stays what it was when the nose began to be turned onto the runway."""
+    """Towards the right, m/s; both stay what they were when the nose began to be turned onto the runway."""
     side_force: float = 0.0
     """Specific force along body y, low-passed, m/s²."""
     cross_speed: float = 0.0
