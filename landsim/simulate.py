@@ -16,6 +16,7 @@ from numpy.random import Generator, SeedSequence, default_rng
 from estimator.compiled import compiled, rotate
 from estimator.so3 import Array, Vec3
 from estimator.strapdown import unpacked
+from landsim.alarms import AGAINST_LANDING
 from landsim.camera_errors import line_camera
 from landsim.config import Scenario
 from landsim.dispersion import dispersed, draws_of_seed
@@ -31,7 +32,7 @@ from landsim.recorder import Recorder
 from landsim.runway import Runway
 from landsim.scene import atmosphere_of, believed_width, loading_of, runway_of, wind_of
 from landsim.sensors import Imu, Pitot, TiltMount, View, camera_of, imu_noise, site_of
-from landsim.state import Phase
+from landsim.state import NavState, Phase
 from landsim.truth import InitialState, Truth
 from landsim.units import DEG
 
@@ -216,6 +217,7 @@ def _fly(
     diverged: str | None = None
     faulty, mains_down = math.inf, False
     phase, climbed = Phase.ACQUIRE, scenario.go_around.end_height_m
+    may_give_up = scenario.go_around.enabled
     for step in range(limit):
         airspeed = pitot.sample(truth)
         if step % imu_every == 0:
@@ -252,7 +254,7 @@ def _fly(
         if phase is _GO_AROUND:
             if -truth.motion.item(2) >= climbed and truth.motion.item(5) < 0.0:
                 return End("go_around", guidance.reason)
-        elif diverged is not None and not omniscient:
+        elif diverged is not None and not (omniscient or (may_give_up and _warned(nav))):
             return End("diverged", diverged)
         if truth.wow_nose or truth.wow_left or truth.wow_right:
             if faulty == math.inf:
@@ -277,6 +279,11 @@ def _fly(
 
 _ZERO = (0.0, 0.0, 0.0)
 _GO_AROUND = Phase.GO_AROUND  # a member looked up in its class costs as much as a call
+
+
+def _warned(nav: NavState) -> bool:
+    """Whether navigation that has diverged says so to guidance, which then has a reason to climb out by a state."""
+    return bool(nav.alarm & AGAINST_LANDING) and all(map(math.isfinite, (*nav.position, *nav.velocity)))
 
 
 def _fault_time(truth: Truth, runway: Runway, wheels: Vec3, mains_down: bool) -> float:

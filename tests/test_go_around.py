@@ -100,6 +100,17 @@ def test_blinded_before_the_decision_height_it_climbs_out() -> None:
     assert flight.log["true_airspeed_mps"].min() > 35.0
 
 
+def test_a_filter_that_diverges_is_left_to_guidance_where_it_may_give_up() -> None:
+    """An edge that is wrong from the start, which no line agrees with: without go-arounds the flight ends there."""
+    wrong = {"fault.kind": "wrong", "fault.at_s": 0.0, "fault.lasting_s": 1000.0}
+    scenario = landsim.load_scenario("weather", wrong)
+    flight = landsim.fly(scenario, seed=15)
+    assert flight.metrics["outcome"] == "go_around"
+    assert "the lines contradict the navigation state" in flight.metrics["reason"]
+    never = landsim.load_scenario("weather", wrong | {"go_around.enabled": False})
+    assert landsim.fly(never, seed=15).metrics["outcome"] == "diverged"
+
+
 def test_the_heights_are_in_order() -> None:
     with pytest.raises(ValueError, match="commit_height_m"):
         landsim.load_scenario("landing", overrides={"go_around.commit_height_m": 31.0})
