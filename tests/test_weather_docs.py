@@ -26,7 +26,7 @@ def test_the_report_is_of_the_scenario_as_it_is() -> None:
 def test_commands_are_known() -> None:
     fenced = [line for line in PAGE.splitlines() if line.startswith("landsim ")]
     within = re.findall(r"`(landsim batch [^`]*)`", PAGE)
-    assert (len(fenced), len(within)) == (2, 2)
+    assert (len(fenced), len(within)) == (2, 3)
     for line in (*fenced, *within):
         command, *arguments = shlex.split(line)[1:]
         program.commands[command].make_context(command, list(arguments))
