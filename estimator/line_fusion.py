@@ -7,7 +7,7 @@ One that is known exactly has none and stays what it is.
 
 import functools
 import operator
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,8 +30,6 @@ time without any they may lie so far off that the first linearisation makes a fi
 ITERATIONS = 8
 SETTLED = 0.01
 """Change of the position, m, at which that is over."""
-Measured: TypeAlias = tuple[Array, Array, Array, int, int, float]
-"""As `estimator.single_lines.lines_innovation` gives it."""
 _OPEN, _CLOSED = np.full(LINES, np.inf), np.full(LINES, -1.0)
 """Gates that every line passes, and none."""
 
@@ -61,6 +59,17 @@ def with_constants(start: Start, calibration: Array, noise: ImuNoise, gravity: f
         covariance[AUGMENTED:, AUGMENTED:] = np.eye(AXES) * square
         covariance[ACCEL_BIAS, ACCEL_BIAS] -= np.eye(3) * square * gravity**2
     return Start(start.state, covariance)
+
+
+class Measured(NamedTuple):
+    """What `estimator.single_lines.lines_innovation` gives."""
+
+    y: Array
+    H: Array
+    R: Array
+    found: int
+    believed: int
+    nis: float
 
 
 class LinesUpdate(NamedTuple):
@@ -166,7 +175,9 @@ class LineVisionFilter(InertialVisionFilter):
     def _innovation(self, lines: Array, extent: Array, tilt: float, gates: Array, point: Array) -> Measured:
         """As `lines_innovation`, of this filter's state."""
         P = self._ekf.P
-        return lines_innovation(self._eye, lines, extent, self.nominal, self.calibration, tilt, P, gates, point)
+        return Measured(
+            *lines_innovation(self._eye, lines, extent, self.nominal, self.calibration, tilt, P, gates, point)
+        )
 
     def _where_led(self, lines: Array, extent: Array, tilt: float, which: int) -> Measured | None:
         """The measurement of some lines, given as bits, at the state that agrees best with it and with them.
@@ -195,16 +206,16 @@ class LineVisionFilter(InertialVisionFilter):
         agreeing pairs have in common is if there are more.
         """
         measured = self._where_led(lines, extent, tilt, found)
-        if measured is not None and measured[4] == found:
+        if measured is not None and measured.believed == found:
             return measured
         if measured is not None and found == ALL:
             pairs = [ALL & ~(1 << line) for line in range(LINES)]
             led = {pair: self._where_led(lines, extent, tilt, pair) for pair in pairs}
-            agreeing = [pair for pair, told in led.items() if told is not None and told[4] == pair]
+            agreeing = [pair for pair, told in led.items() if told is not None and told.believed == pair]
             common = functools.reduce(operator.and_, agreeing, ALL)
             if agreeing and common:
                 measured = led[common] if common in led else self._where_led(lines, extent, tilt, common)
-                if measured is not None and measured[4] == common:
+                if measured is not None and measured.believed == common:
                     return measured
         return self._innovation(lines, extent, tilt, _CLOSED, self._zero)
 

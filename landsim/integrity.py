@@ -102,7 +102,9 @@ class LineMonitor:
         alarm = Alarm.WRONG_LINE if any(self._wrong) else Alarm.NONE
         if time - self._aided > self._unaided:
             alarm |= Alarm.UNAIDED
-        strange = any(wrong and agreed < self._confirm for wrong, agreed in zip(self._wrong, self._agreed, strict=True))
-        if strange or self._strained or self._disagreed >= self._confirm or sum(self._wrong) > 1:
+        never_agreed = any(
+            wrong and agreed < self._confirm for wrong, agreed in zip(self._wrong, self._agreed, strict=True)
+        )
+        if never_agreed or self._strained or self._disagreed >= self._confirm or sum(self._wrong) > 1:
             alarm |= Alarm.INCONSISTENT
         return alarm

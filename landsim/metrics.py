@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 Array: TypeAlias = NDArray[np.float64]
 Log: TypeAlias = Mapping[str, Array]
+Rows: TypeAlias = slice | NDArray[np.bool_]
+"""Of a log."""
 
 ENDS = (
     "stopped", "touchdown", "timeout", "diverged", "trim_failed", "error", "structure_contact", "below_ground", "fault",
@@ -90,13 +92,13 @@ def p95(values: ArrayLike) -> float | None:
     return float(np.percentile(np.abs(finite), 95.0)) if finite.size else None
 
 
-def error(log: Log, source: str, quantity: str, rows: Any = EVERY) -> Array:
+def error(log: Log, source: str, quantity: str, rows: Rows = EVERY) -> Array:
     """Error of ``vision`` or ``fused`` in a quantity of ``landsim.log.QUANTITIES``, in its unit; angles are wrapped."""
     difference = log[f"{source}_{quantity}"][rows] - log[f"true_{quantity}"][rows]
     return wrapped_deg(difference) if quantity.endswith("_deg") else difference
 
 
-def main_wheels(log: Log, aircraft: "AircraftConfig", rows: Any = EVERY) -> tuple[Array, Array]:
+def main_wheels(log: Log, aircraft: "AircraftConfig", rows: Rows = EVERY) -> tuple[Array, Array]:
     """Along and cross position of the midpoint of the main wheels in these rows, runway frame, m.
 
     That is the cg's + R_runway_from_body m, with R_runway_from_body that of ``estimator.so3.from_euler`` and m the

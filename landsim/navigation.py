@@ -274,8 +274,7 @@ class Navigator:
         if update.degrees > 0:
             self._rejected = 0 if update.accepted else self._rejected + 1
         self.stage = _NONE if not update.accepted else _EARLY if update.degrees == 6 else _LATE
-        found = _BY_DEGREES[update.degrees]
-        return FrameResult(update, self.stage, roll, self._late, found, found if update.accepted else 0)
+        return FrameResult(update, self.stage, roll, self._late)
 
     def _observe_lines(self, running: LineVisionFilter, frame: CameraFrame, lines: Array, roll: float) -> FrameResult:
         """A frame of which each line counts by itself."""

@@ -214,12 +214,12 @@ class Recorder:
 
     def table(self) -> dict[str, Array]:
         """The log: a column for each of `landsim.log.COLUMNS`."""
-        log = self._columns() if self._count > 0 else {}
+        log = self._written() if self._count > 0 else {}
         return {
             column.name: log[column.name] if column.name in log else np.full(self._count, np.nan) for column in COLUMNS
         }
 
-    def _columns(self) -> dict[str, Array]:
+    def _written(self) -> dict[str, Array]:
         """Those columns for which there is something."""
         log: dict[str, Array] = {}
         self._drop_frame_without_step()

@@ -329,10 +329,10 @@ def test_integrity_shows_levels_lines_and_alarms(flight: dict[str, Array]) -> No
         "lines_believed": np.where(wrong, 6.0, 7.0),
         "alarm": np.where(wrong, 5.0, 0.0),
     }
-    enabled = SimpleNamespace(
+    enabled: Any = SimpleNamespace(
         **{**vars(SCENARIO), "go_around": SCENARIO.go_around.model_copy(update={"enabled": True})}
     )
-    panels = [axes for axes in plots.integrity(log, enabled, measured(log)).axes if axes.get_yticklabels()]  # type: ignore[arg-type]
+    panels = [axes for axes in plots.integrity(log, enabled, measured(log)).axes if axes.get_yticklabels()]
     lateral, _, lines, alarms = (axes for axes in panels if "along" not in axes.get_xlabel())
     _, beyond = line(lateral, "error beyond it")
     assert beyond == pytest.approx(4.0)
