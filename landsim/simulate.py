@@ -254,7 +254,7 @@ def _fly(
         if phase is _GO_AROUND:
             if -truth.motion.item(2) >= climbed and truth.motion.item(5) < 0.0:
                 return End("go_around", guidance.reason)
-        elif diverged is not None and not (omniscient or (may_give_up and _warned(nav))):
+        elif diverged is not None and not (omniscient or (may_give_up and warns(nav))):
             return End("diverged", diverged)
         if truth.wow_nose or truth.wow_left or truth.wow_right:
             if faulty == math.inf:
@@ -281,7 +281,7 @@ _ZERO = (0.0, 0.0, 0.0)
 _GO_AROUND = Phase.GO_AROUND  # a member looked up in its class costs as much as a call
 
 
-def _warned(nav: NavState) -> bool:
+def warns(nav: NavState) -> bool:
     """Whether navigation that has diverged says so to guidance, which then has a reason to climb out by a state."""
     return bool(nav.alarm & AGAINST_LANDING) and all(map(math.isfinite, (*nav.position, *nav.velocity)))
 

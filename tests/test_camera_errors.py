@@ -451,6 +451,16 @@ def test_an_edge_is_not_smeared_along_itself() -> None:
     assert noiseless == pytest.approx(sharp[1] / (1.0 + smear**2 / 12.0 / 0.05**2), rel=0.02)
 
 
+def test_in_flight_blur_is_told_by_the_noise_that_navigation_takes() -> None:
+    """Of a camera without noise navigation takes 0.05 px: blurred lines are seen, and believed for what they are."""
+    changes = {"navigation.aiding": "lines", "camera.noise_px": 0.0, "camera.exposure_s": 0.002}
+    flight = fly(load_scenario("landing", changes | {"simulation.time_limit_s": 5.0}), seed=0)
+    found, believed = (flight.log[f"lines_{kind}"][120:] for kind in ("found", "believed"))
+    assert (found == 7.0).mean() > 0.9
+    assert (believed == found).mean() > 0.99
+    assert np.nanmean(flight.log["nees9"]) < 18.0  # of 9
+
+
 def test_a_frame_counts_when_it_arrives_and_shows_what_was_there_before() -> None:
     """A flight's first second: 0.1 s are twelve of its steps."""
     settings: dict[str, Any] = {"simulation.time_limit_s": 1.0, "navigation.start": "handover"}

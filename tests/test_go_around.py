@@ -10,6 +10,7 @@ from landsim.go_around import NO_DOUBT, Doubt, doubt_of, doubted, gives_up
 from landsim.guidance import INITIAL, guide, law_of
 from landsim.plugins import nav_state
 from landsim.schema.flight import GoAroundConfig
+from landsim.simulate import warns
 from landsim.state import Alarm, NavState, Phase, Stage
 
 LIMITS = GoAroundConfig(enabled=True)
@@ -109,6 +110,23 @@ def test_a_filter_that_diverges_is_left_to_guidance_where_it_may_give_up() -> No
     assert "the lines contradict the navigation state" in flight.metrics["reason"]
     never = landsim.load_scenario("weather", wrong | {"go_around.enabled": False})
     assert landsim.fly(never, seed=15).metrics["outcome"] == "diverged"
+
+
+@pytest.mark.parametrize(
+    ("nav", "warned"),
+    [
+        (GOOD, False),
+        (GOOD._replace(alarm=Alarm.WRONG_LINE), False),
+        (GOOD._replace(alarm=Alarm.UNAIDED), True),
+        (GOOD._replace(alarm=Alarm.INCONSISTENT), True),
+        (GOOD._replace(alarm=Alarm.INCONSISTENT, position=(-300.0, math.nan, -25.0)), False),
+        (GOOD._replace(alarm=Alarm.INCONSISTENT, velocity=(39.0, 0.0, math.inf)), False),
+    ],
+)
+def test_guidance_is_warned_of_a_divergence_by_an_alarm_and_a_state_to_climb_out_by(
+    nav: NavState, warned: bool
+) -> None:
+    assert warns(nav) is warned
 
 
 def test_the_heights_are_in_order() -> None:

@@ -20,7 +20,7 @@ from landsim.resources import find_aircraft
 from landsim.runway import Runway
 from landsim.sensors import Imu, site_of
 from landsim.state import Command
-from landsim.truth import NOMINAL, InitialState, Loading, Truth
+from landsim.truth import AFTER_MOTION, MOTION, NOMINAL, InitialState, Loading, Truth
 from landsim.units import DEG, FT, STANDARD_GRAVITY
 
 FOLDER = find_aircraft("pioneer")[1]
@@ -201,15 +201,33 @@ def test_yaw_does_not_jump_at_north() -> None:
 
 def test_command_and_feed_reach_their_properties() -> None:
     plant, _ = started()
-    plant.command(Command(True, 0.1, 0.2, 41.0, True, True, -0.3, 0.4, 0.9))
+    plant.command(Command(True, 0.1, 0.2, 41.0, True, True, -0.3, 0.4, 0.9, 0.5, 0.07))
     plant.feed((0.01, 0.02, 0.03), 0.04, 0.05, 0.06, 39.0)
     wanted = {
         "ap/engaged": 1.0, "ap/pitch-cmd-rad": 0.1, "ap/roll-cmd-rad": 0.2, "ap/airspeed-cmd-mps": 41.0, "ap/idle": 1.0,
-        "ap/ground": 1.0, "ap/steering-cmd-norm": -0.3, "ap/brake-cmd-norm": 0.4, "imu/p-rad_sec": 0.01,
+        "ap/ground": 1.0, "ap/steering-cmd-norm": -0.3, "ap/brake-cmd-norm": 0.4, "ap/align": 0.5,
+        "ap/rudder-align-rad": 0.07, "imu/p-rad_sec": 0.01,
         "imu/q-rad_sec": 0.02, "imu/r-rad_sec": 0.03, "imu/ay-mps2": 0.04, "nav/roll-rad": 0.05, "nav/pitch-rad": 0.06,
         "nav/airspeed-mps": 39.0,
     }  # fmt: skip
     assert {name: read(plant, name) for name in wanted} == wanted
+
+
+def test_controls_and_wheels_of_the_truth_are_jsbsim_s() -> None:
+    """With all surfaces off their trim, each by the name under which the log takes it down."""
+    plant, truth = started()
+    truth = fly(plant, truth, 1.5, weave)[-1]
+    names = {
+        "elevator": "fcs/elevator-pos-rad", "aileron": "fcs/left-aileron-pos-rad", "rudder": "fcs/rudder-pos-rad",
+        "throttle": "fcs/throttle-pos-norm",
+    }  # fmt: skip
+    taken = {name: float(truth.motion[MOTION + AFTER_MOTION.index(name)]) for name in AFTER_MOTION}
+    expected = {name: read(plant, of) for name, of in names.items()}
+    assert len(set(expected.values())) == len(expected)
+    assert {name: taken[name] for name in names} == expected
+    assert {name: getattr(truth, name) for name in names} == expected
+    assert (taken["time"], taken["airspeed"]) == (truth.time, truth.airspeed)
+    assert [taken[f"wow_{wheel}"] for wheel in ("nose", "left", "right")] == [0.0, 0.0, 0.0]
 
 
 def test_same_inputs_same_bits() -> None:
