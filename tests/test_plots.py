@@ -317,6 +317,17 @@ def test_a_rejected_frame_is_told_by_what_was_seen(flight: dict[str, Array]) -> 
     assert titles == ["three lines, rejected"] * 4 + ["two lines, rejected"] * 2
 
 
+def test_a_go_around_is_marked_and_what_there_is_not_is_not_in_the_legend(flight: dict[str, Array]) -> None:
+    up = np.arange(flight["time_s"].size) >= 1500
+    log = flight | {"phase": np.where(up, 5.0, flight["phase"]), "lines_found": np.zeros(up.size)}
+    figure = plots.integrity(log, SCENARIO, measured(log))
+    words = [text.get_text() for axes in figure.axes for text in axes.texts]
+    assert "go-around" in words
+    assert "none was seen" in words
+    assert "error beyond it" not in [text.get_text() for text in figure.legends[0].get_texts()]
+    assert (float(flight["time_s"][1500]), "go-around") in style.event_times(log, measured(log))
+
+
 def test_integrity_shows_levels_lines_and_alarms(flight: dict[str, Array]) -> None:
     """The level is passed by 1 m in rows 2000 to 2099; the left edge is at fault and left out in 1000 to 1199."""
     rows = np.arange(flight["time_s"].size)

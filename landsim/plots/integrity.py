@@ -96,11 +96,12 @@ def _level(axes: Axes, log: Log, few: Log, name: str, quantity: str, limit: floa
         beyond = np.flatnonzero(off > level)
     axes.plot(few["time_s"], np.maximum(drawn, LEAST), color=BLUE, lw=0.8, label="error")
     axes.plot(few["time_s"], stated, color=BLACK, lw=1.4, label="protection level")
-    every = max(1, beyond.size // 200)
-    axes.plot(
-        log["time_s"][beyond][::every], np.maximum(off[beyond], LEAST)[::every], color=VERMILION, ls="none", marker="x",
-        ms=4.0, mew=0.9, label="error beyond it",
-    )  # fmt: skip
+    if beyond.size:
+        some = beyond[:: max(1, beyond.size // 200)]
+        axes.plot(
+            log["time_s"][some], np.maximum(off[some], LEAST), color=VERMILION, ls="none", marker="x", ms=4.0, mew=0.9,
+            label="error beyond it",
+        )  # fmt: skip
     if limit is not None:
         axes.axhline(limit, **LIMIT, label="go-around above")
     axes.set_yscale("log")
@@ -132,6 +133,8 @@ def _lines(axes: Axes, log: Log) -> None:
         _bars(axes, log["time_s"], (believed & (1 << i)) != 0, place, "believed")
         _bars(axes, log["time_s"], fault == i + 1, place, "missing or another one")
     _names(axes, tuple(reversed(LINES)))
+    if not found.any():
+        note(axes, "none was seen")
 
 
 def _alarms(axes: Axes, log: Log) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from landsim.log import LINES
 from landsim.metrics import CRASHES, Array, Log, find_touchdown, main_wheels
+from landsim.state import Phase
 
 if TYPE_CHECKING:
     from landsim.config import Scenario
@@ -141,7 +142,7 @@ def handed_over(log: Log) -> int | None:
 
 
 def event_times(log: Log, metrics: dict[str, Any], failed: Failure | None = None) -> list[tuple[float, str]]:
-    """Hand-over from three lines to two, touchdown, the loss of all lines and a crash, by when they were."""
+    """Hand-over from three lines to two, touchdown, go-around, the loss of all lines and a crash, by when they were."""
     time = log["time_s"]
     marks = []
     late = handed_over(log)
@@ -149,6 +150,9 @@ def event_times(log: Log, metrics: dict[str, Any], failed: Failure | None = None
         marks.append((float(time[late]), "two lines"))
     if metrics["touchdown"] is not None:
         marks.append((metrics["touchdown"]["time_s"], "touchdown"))
+    climbing = np.flatnonzero(log["phase"] == Phase.GO_AROUND)
+    if climbing.size:
+        marks.append((float(time[climbing[0]]), "go-around"))
     seen = np.flatnonzero(np.any(list(lines_seen(log).values()), axis=0))
     if seen.size and time[-1] - time[seen[-1]] > 1.0:
         marks.append((float(time[seen[-1]]), "no more lines"))
